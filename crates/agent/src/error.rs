@@ -1,0 +1,27 @@
+//! Errors of this crate.
+
+use thiserror::Error;
+
+/// Why an episode could not be played.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scenario does not fit.
+    #[error(transparent)]
+    Scenario(#[from] scenario::Error),
+    /// The planner's settings are impossible.
+    #[error(transparent)]
+    Planner(#[from] planner::Error),
+    /// A method that needs a prior was given none.
+    #[error("method {method} needs a trained prior, none was given")]
+    NoPrior {
+        /// Method.
+        method: &'static str,
+    },
+    /// The oracle was asked of a world that does not know its own truth.
+    #[error("method oracle needs a world that knows its true state")]
+    NoTruth,
+    /// The world failed.
+    #[error("the world failed: {0}")]
+    World(String),
+}

@@ -1,0 +1,15 @@
+//! Algorithm 1 of Hayashi et al. (ICRA 2019): search from the belief, act, observe, let the network suggest, update, prune.
+//!
+//! [`Agent::run`] plays one episode on a [`World`] with one [`Method`] and returns its [`Episode`].
+
+mod agent;
+mod error;
+mod method;
+mod record;
+mod world;
+
+pub use agent::Agent;
+pub use error::Error;
+pub use method::Method;
+pub use record::{Episode, Reason, StepRecord};
+pub use world::{SimulatedWorld, World, WorldStep};

@@ -1,0 +1,71 @@
+//! What is kept of an episode.
+
+use physics_model::{Action, Observation};
+use pomdp::UpdateReport;
+use serde::{Deserialize, Serialize};
+
+/// Why an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// The object reached the goal region.
+    Goal,
+    /// No actions left.
+    Horizon,
+    /// Out of particles.
+    Depleted,
+    /// The true world became impossible.
+    Diverged,
+}
+
+/// One step of an episode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// Executed action.
+    pub action: Action,
+    /// Observation after it.
+    pub observation: Observation,
+    /// Reward.
+    pub reward: f64,
+    /// Value of the action in the search; `None` without search.
+    pub value: Option<f64>,
+    /// Simulations of the search.
+    pub simulations: usize,
+    /// Transitions simulated for the decision and the belief update.
+    pub transitions: usize,
+    /// Belief update; `None` where there was none (last step, no belief).
+    pub update: Option<UpdateReport>,
+    /// Share of the particles with an obstacle after the update; `None` without belief.
+    pub obstacle_share: Option<f64>,
+    /// A force above the limit.
+    pub large_force: bool,
+    /// The object or the tool pushed against the obstacle.
+    pub obstacle_touched: bool,
+}
+
+/// An episode.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Episode {
+    /// Why it ended.
+    pub reason: Reason,
+    /// Σ γ^t r_t.
+    pub discounted_return: f64,
+    /// Updates in which no simulated particle agreed with the observation.
+    pub depletions: usize,
+    /// Steps.
+    pub steps: Vec<StepRecord>,
+}
+
+impl Episode {
+    /// Whether the object reached the goal region.
+    #[must_use]
+    pub fn success(&self) -> bool {
+        self.reason == Reason::Goal
+    }
+
+    /// Transitions simulated in the whole episode.
+    #[must_use]
+    pub fn transitions(&self) -> usize {
+        self.steps.iter().map(|s| s.transitions).sum()
+    }
+}

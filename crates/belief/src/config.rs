@@ -1,0 +1,112 @@
+//! Settings of the rejection filter. Every key is required: a scenario states what it runs.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// Settings of [`crate::RejectionFilter`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Particles of a belief: N.
+    pub particles: usize,
+    /// Most transitions that one update may simulate.
+    pub max_attempts: usize,
+    /// Share of `max_attempts` that is kept for perturbed particles, in [0, 1). Zero means no reinvigoration by noise.
+    pub noise_share: f64,
+    /// Largest share of a belief that comes from outside proposals while simulation accepts anything, in [0, 1). Zero ignores
+    /// proposals, even where nothing else explains the observation.
+    pub proposal_share: f64,
+}
+
+impl Config {
+    /// Checks every value against its limits.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Config`] with the key, its value and the limit.
+    pub fn validate(&self) -> Result<(), Error> {
+        let Self { particles, max_attempts, noise_share, proposal_share } = self;
+        require(*particles >= 1, "particles", particles, "at least 1")?;
+        let limit = format!("at least particles = {particles}");
+        require(max_attempts >= particles, "max_attempts", max_attempts, limit)?;
+        for (key, share) in [("noise_share", noise_share), ("proposal_share", proposal_share)] {
+            require((0.0..1.0).contains(share), key, share, "in [0, 1)")?;
+        }
+        Ok(())
+    }
+
+    /// Attempts of the first phase, in which particles are not perturbed. At least one.
+    pub(crate) fn plain_attempts(&self) -> usize {
+        // Rounding could otherwise reserve everything where the share is just below one.
+        let reserved = (self.noise_share * self.max_attempts as f64) as usize;
+        self.max_attempts - reserved.min(self.max_attempts - 1)
+    }
+
+    /// Places of the belief that proposals may take. At least one place is left to simulation.
+    pub(crate) fn proposal_places(&self) -> usize {
+        ((self.proposal_share * self.particles as f64) as usize).min(self.particles - 1)
+    }
+}
+
+fn require(holds: bool, key: &'static str, value: &dyn ToString, limit: impl Into<String>) -> Result<(), Error> {
+    if holds { Ok(()) } else { Err(Error::Config { key, value: value.to_string(), limit: limit.into() }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "
+        particles = 1000
+        max_attempts = 20000
+        noise_share = 0.25
+        proposal_share = 0.3
+    ";
+
+    fn config() -> Config {
+        toml::from_str(TEXT).unwrap()
+    }
+
+    #[test]
+    fn a_scenario_file_sets_every_key() {
+        let expected = Config { particles: 1000, max_attempts: 20_000, noise_share: 0.25, proposal_share: 0.3 };
+        assert_eq!(config(), expected);
+        assert_eq!(toml::from_str::<Config>(&toml::to_string(&expected).unwrap()).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_misspelt_or_missing_key_is_named() {
+        let misspelt = toml::from_str::<Config>(&format!("{TEXT}\nparticle = 3")).unwrap_err().to_string();
+        assert!(misspelt.contains("unknown field `particle`"), "{misspelt}");
+        let missing = toml::from_str::<Config>(&TEXT.replace("noise_share = 0.25", "")).unwrap_err().to_string();
+        assert!(missing.contains("missing field `noise_share`"), "{missing}");
+    }
+
+    #[test]
+    fn values_outside_their_limits_name_key_value_and_limit() {
+        let message = |change: fn(&mut Config)| {
+            let mut config = config();
+            change(&mut config);
+            config.validate().unwrap_err().to_string()
+        };
+        assert_eq!(config().validate(), Ok(()));
+        assert_eq!(message(|c| c.particles = 0), "belief: `particles` is 0, but must be at least 1");
+        assert_eq!(
+            message(|c| c.max_attempts = 999),
+            "belief: `max_attempts` is 999, but must be at least particles = 1000"
+        );
+        assert_eq!(message(|c| c.noise_share = 1.0), "belief: `noise_share` is 1, but must be in [0, 1)");
+        assert_eq!(message(|c| c.noise_share = -0.1), "belief: `noise_share` is -0.1, but must be in [0, 1)");
+        assert_eq!(message(|c| c.proposal_share = f64::NAN), "belief: `proposal_share` is NaN, but must be in [0, 1)");
+    }
+
+    #[test]
+    fn shares_leave_an_attempt_and_a_place_to_plain_simulation() {
+        assert_eq!((config().plain_attempts(), config().proposal_places()), (15_000, 300));
+        let most = 1.0 - f64::EPSILON / 2.0;
+        let extreme = Config { particles: 10, max_attempts: 10, noise_share: most, proposal_share: most };
+        assert_eq!(extreme.validate(), Ok(()));
+        assert_eq!((extreme.plain_attempts(), extreme.proposal_places()), (1, 9));
+    }
+}

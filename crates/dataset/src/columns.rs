@@ -1,0 +1,189 @@
+//! The rows of a shard as flat columns: checked and counted.
+
+use crate::{Error, Row, Schema};
+
+/// Columns of one shard; vector columns are row-major.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Columns {
+    pub(crate) episode: Vec<u64>,
+    pub(crate) step: Vec<u32>,
+    pub(crate) action: Vec<i8>,
+    pub(crate) reward: Vec<f32>,
+    pub(crate) outcome: Vec<u8>,
+    pub(crate) observation: Vec<f32>,
+    pub(crate) state: Vec<f64>,
+    pub(crate) theta: Vec<f64>,
+    pub(crate) classes: Vec<u8>,
+}
+
+impl Columns {
+    /// Columns of `rows`, which must fit the schema and form whole episodes.
+    pub(crate) fn from_rows(schema: &Schema, rows: &[Row]) -> Result<Self, Error> {
+        let mut columns = Self::default();
+        for (i, row) in rows.iter().enumerate() {
+            let previous = i.checked_sub(1).map(|p| &rows[p]);
+            check(schema, row, previous, rows.get(i + 1)).map_err(|(column, reason)| Error::Row {
+                row: i,
+                episode: row.episode,
+                step: row.step,
+                column,
+                reason,
+            })?;
+            columns.episode.push(row.episode);
+            columns.step.push(row.step);
+            columns.action.push(row.action);
+            columns.reward.push(row.reward);
+            columns.outcome.push(row.outcome);
+            columns.observation.extend(&row.observation);
+            columns.state.extend(&row.state);
+            columns.theta.extend(&row.theta);
+            columns.classes.extend(&row.classes);
+        }
+        Ok(columns)
+    }
+
+    /// Number of rows.
+    pub(crate) fn rows(&self) -> usize {
+        self.episode.len()
+    }
+
+    /// Half-open ranges of rows, one an episode.
+    pub(crate) fn episodes(&self) -> Vec<std::ops::Range<usize>> {
+        let mut start = 0;
+        self.episode
+            .chunk_by(|a, b| a == b)
+            .map(|run| {
+                let range = start..start + run.len();
+                start = range.end;
+                range
+            })
+            .collect()
+    }
+}
+
+/// Column and reason if `row` does not fit the schema or its neighbours.
+fn check(schema: &Schema, row: &Row, previous: Option<&Row>, next: Option<&Row>) -> Result<(), (String, String)> {
+    let fail = |column: &str, reason: String| Err((column.to_owned(), reason));
+    let lengths = [row.observation.len(), row.state.len(), row.theta.len(), row.classes.len()];
+    for ((column, names), found) in schema.lists().into_iter().zip(lengths) {
+        if found != names.len() {
+            return fail(column, format!("expected {} values, found {found}", names.len()));
+        }
+    }
+    let values = (row.observation.iter().map(|v| f64::from(*v)).zip(&schema.observation))
+        .chain(row.state.iter().copied().zip(&schema.state))
+        .chain(row.theta.iter().copied().zip(&schema.theta));
+    for (value, name) in values {
+        if !value.is_finite() {
+            return fail(name, format!("expected a finite value, found {value}"));
+        }
+    }
+    if !row.reward.is_finite() {
+        return fail("reward", format!("expected a finite value, found {}", row.reward));
+    }
+
+    let before = previous.filter(|p| p.episode == row.episode);
+    if let Some(previous) = previous
+        && row.episode < previous.episode
+    {
+        return fail("episode", format!("expected ascending episodes, found {} before", previous.episode));
+    }
+    let step = before.map_or(Some(0), |p| p.step.checked_add(1));
+    if step != Some(row.step) {
+        return fail("step", format!("expected consecutive steps from 0, found {}", row.step));
+    }
+    match (before, usize::try_from(row.action)) {
+        (None, _) if row.action == -1 => {}
+        (None, _) => {
+            return fail("action", format!("expected -1 in the first row of an episode, found {}", row.action));
+        }
+        (Some(_), Ok(action)) if action < schema.action_count => {}
+        (Some(_), _) => {
+            return fail("action", format!("expected 0 to {}, found {}", schema.action_count - 1, row.action));
+        }
+    }
+    if let Some(before) = before {
+        // Bits, because a sign of zero also has to survive where an episode keeps one copy.
+        if !before.theta.iter().map(|v| v.to_bits()).eq(row.theta.iter().map(|v| v.to_bits())) {
+            return fail("theta", "expected the same values in the whole episode".into());
+        }
+        if before.classes != row.classes {
+            return fail("classes", "expected the same values in the whole episode".into());
+        }
+    }
+    let last = next.is_none_or(|n| n.episode != row.episode);
+    if last != (row.outcome != 0) {
+        return fail("outcome", format!("expected 0 but in the last row of an episode, found {}", row.outcome));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn schema() -> Schema {
+        Schema {
+            robot: "arm".into(),
+            observation: vec!["torque_nm".into()],
+            action_count: 10,
+            state: vec!["x_m".into()],
+            theta: vec!["mass_kg".into()],
+            classes: vec!["shape".into()],
+        }
+    }
+
+    fn episode() -> Vec<Row> {
+        let row = |step, action, outcome| Row {
+            episode: 7,
+            step,
+            action,
+            reward: 0.0,
+            outcome,
+            observation: vec![1.0],
+            state: vec![2.0],
+            theta: vec![0.0],
+            classes: vec![1],
+        };
+        vec![row(0, -1, 0), row(1, 9, 0), row(2, 0, 3)]
+    }
+
+    #[test]
+    fn whole_episodes_pass_and_are_found_again() {
+        let mut rows = episode();
+        rows.extend(episode().into_iter().map(|r| Row { episode: 9, ..r }));
+        let columns = Columns::from_rows(&schema(), &rows).unwrap();
+        assert_eq!(columns.episodes(), [0..3, 3..6]);
+    }
+
+    #[test]
+    fn a_row_that_breaks_a_rule_is_refused_by_its_column() {
+        type Case = (&'static str, usize, fn(&mut Row));
+        let broken: [Case; 12] = [
+            ("observation", 0, |r| r.observation.push(0.0)),
+            ("classes", 0, |r| r.classes.clear()),
+            ("torque_nm", 1, |r| r.observation[0] = f32::NAN),
+            ("x_m", 1, |r| r.state[0] = f64::INFINITY),
+            ("reward", 1, |r| r.reward = f32::NAN),
+            ("step", 1, |r| r.step = 2),
+            ("action", 0, |r| r.action = 0),
+            ("action", 1, |r| r.action = 10),
+            ("action", 1, |r| r.action = -1),
+            ("theta", 1, |r| r.theta[0] = -0.0),
+            ("outcome", 1, |r| r.outcome = 1),
+            ("outcome", 2, |r| r.outcome = 0),
+        ];
+        for (expected, at, change) in broken {
+            let mut rows = episode();
+            change(&mut rows[at]);
+            match Columns::from_rows(&schema(), &rows) {
+                Err(Error::Row { row, column, .. }) => assert_eq!((column.as_str(), row), (expected, at)),
+                other => panic!("{expected}: {other:?}"),
+            }
+        }
+        let mut rows = episode();
+        rows.extend(episode().into_iter().map(|r| Row { episode: 6, ..r }));
+        let error = Columns::from_rows(&schema(), &rows).unwrap_err().to_string();
+        assert!(error.contains("`episode`"), "{error}");
+    }
+}

@@ -1,0 +1,55 @@
+//! Errors of this crate.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a run cannot go on.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The folder belongs to another run.
+    #[error("{file}: key `{key}` is {found}, this run has {expected}: choose another --out or remove the folder")]
+    OtherRun {
+        /// `run.json`.
+        file: PathBuf,
+        /// Key.
+        key: String,
+        /// Its value there.
+        found: String,
+        /// Its value here.
+        expected: String,
+    },
+    /// A file that cannot be read or written.
+    #[error("{file}: {action} failed")]
+    File {
+        /// File.
+        file: PathBuf,
+        /// What was tried.
+        action: &'static str,
+        /// Cause.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A record that is not one.
+    #[error("{file}: line {line}: expected a trial record, {message}")]
+    Record {
+        /// File.
+        file: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What the parser says.
+        message: String,
+    },
+    /// A trial failed.
+    #[error("trial {trial} of {method}")]
+    Trial {
+        /// Trial.
+        trial: u32,
+        /// Method.
+        method: &'static str,
+        /// Cause.
+        #[source]
+        source: agent::Error,
+    },
+}

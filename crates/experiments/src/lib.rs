@@ -1,0 +1,16 @@
+//! Trials of methods on domains, to tables with intervals.
+//!
+//! A run directory holds `run.json` (what the run is), `scenario.toml` (resolved), `trials.jsonl` (one line a trial) and, when all
+//! trials are done, `table.json`, `table.md` and `table.csv`. Finished trials are never redone.
+
+mod error;
+mod interval;
+mod run;
+mod table;
+mod trial;
+
+pub use error::Error;
+pub use interval::wilson95;
+pub use run::{Provenance, Run, RunIdentity};
+pub use table::{Row, Table};
+pub use trial::{TrialRecord, play};

@@ -1,0 +1,187 @@
+//! `cargo xtask eval`: trials of methods on a domain, to a table.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use agent::Method;
+use anyhow::{Context as _, Result};
+use clap::Parser;
+use experiments::{Provenance, Run, RunIdentity, play};
+use indicatif::{ProgressBar, ProgressStyle};
+use pomdp::Seed;
+use prior::Suggester;
+use rayon::prelude::*;
+use scenario::{Problem, Scenario, Selection};
+
+/// Plays trials of methods on a domain and prints the table.
+#[derive(Debug, Parser)]
+#[command(name = "eval", version)]
+struct Arguments {
+    /// Domain: D1 to D5, obstacle, or a scenario file.
+    #[arg(long)]
+    domain: String,
+    /// Arm: sawyer or jaco.
+    #[arg(long, default_value = "sawyer")]
+    robot: String,
+    /// Preset of belief and planner.
+    #[arg(long, default_value = "paper")]
+    preset: String,
+    /// Methods, separated by commas: no-rnn, rnn-max, rnn-sampling, oracle, heuristic.
+    #[arg(long, value_delimiter = ',', default_value = "no-rnn,rnn-max,rnn-sampling")]
+    methods: Vec<Method>,
+    /// Trials a method [default: the scenario's].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    trials: Option<u32>,
+    /// Root seed.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Worker threads [default: all cores].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Small budgets: a run of a minute or two whose figures mean nothing.
+    #[arg(long)]
+    quick: bool,
+    /// Overrides a scenario entry: key=value.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder of the trained prior [default: the one trained here with the same --quick, else the shipped one].
+    #[arg(long)]
+    prior: Option<PathBuf>,
+    /// Run directory [default: runs/eval/DOMAIN-ROBOT-PRESET, runs/quick/eval/… with --quick].
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+    /// Prints the table as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => {
+            eprintln!("interrupted: finished trials are kept, run the same command again to go on");
+            ExitCode::from(130)
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<bool> {
+    let root = match &arguments.root {
+        Some(root) => root.clone(),
+        None => scenario::find_root(&std::env::current_dir()?)?,
+    };
+    let mut scenario = Selection {
+        root: root.clone(),
+        domain: arguments.domain.clone(),
+        robot: arguments.robot.clone(),
+        preset: arguments.preset.clone(),
+        quick: arguments.quick,
+        set: arguments.set.clone(),
+    }
+    .load()?;
+    if let Some(trials) = arguments.trials {
+        scenario.evaluation.trials = trials;
+    }
+    let mut methods = arguments.methods.clone();
+    methods.sort();
+    methods.dedup();
+    let problem = Problem::assemble(&scenario, &root)?;
+    let prior = if methods.iter().any(|m| m.needs_prior()) {
+        let folder = prior_folder(arguments, &scenario, &root);
+        eprintln!("prior: {}", folder.display());
+        Some(Suggester::load(&folder, &scenario.robot.name, &problem.model)?)
+    } else {
+        None
+    };
+    let provenance = Provenance {
+        run: RunIdentity {
+            version: 1,
+            scenario_hash: scenario.hash(),
+            seed: arguments.seed,
+            prior_hash: prior.as_ref().map(|p| p.hash().to_string()),
+            methods,
+            trials: scenario.evaluation.trials,
+        },
+        program: format!("eval {}", env!("CARGO_PKG_VERSION")),
+        commit: scenario::commit(&root),
+    };
+    let out = arguments.out.clone().unwrap_or_else(|| {
+        let name = format!("{}-{}-{}", scenario.name, scenario.robot.name, scenario.preset);
+        root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(name)
+    });
+    let run = Run::open(&out, provenance, &scenario.to_toml())?;
+    if run.resumed() > 0 {
+        eprintln!("{} trials are finished already", run.resumed());
+    }
+    if !play_missing(&run, &problem, prior.as_ref(), arguments)? {
+        return Ok(false);
+    }
+    let s = &scenario;
+    let table = run.finish(&s.name, &s.robot.name, &s.preset, &s.evaluation.published)?;
+    if arguments.json {
+        println!("{}", serde_json::to_string(&table)?);
+    } else {
+        print!("{}", table.to_markdown());
+        eprintln!("written to {}", out.display());
+    }
+    Ok(true)
+}
+
+/// Plays what is missing on all threads; false where it was interrupted.
+fn play_missing(run: &Run, problem: &Problem, prior: Option<&Suggester>, arguments: &Arguments) -> Result<bool> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
+    let missing = run.missing();
+    let bar = ProgressBar::new(missing.len() as u64);
+    let style = "{bar:40} {pos}/{len} trials, {per_sec}, {eta} left {msg}";
+    bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build()?;
+    let results: Vec<Result<()>> = pool.install(|| {
+        missing
+            .par_iter()
+            .with_max_len(1)
+            .map(|&(method, trial)| {
+                if interrupted.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
+                #[expect(clippy::disallowed_methods, reason = "a program may time its trials; nothing depends on it")]
+                let started = std::time::Instant::now();
+                let (mut record, _) = play(problem, method, prior, Seed(arguments.seed), trial)?;
+                record.seconds = started.elapsed().as_secs_f64();
+                run.keep(&record)?;
+                bar.inc(1);
+                if bar.is_hidden() {
+                    let end = format!("{:?}", record.reason).to_lowercase();
+                    eprintln!("{} trial {trial}: {end} after {} actions, {:.1} s", method.name(), record.steps, record.seconds);
+                }
+                Ok(())
+            })
+            .collect()
+    });
+    bar.finish_and_clear();
+    results.into_iter().collect::<Result<Vec<()>>>()?;
+    Ok(!interrupted.load(Ordering::Relaxed))
+}
+
+fn prior_folder(arguments: &Arguments, scenario: &Scenario, root: &Path) -> PathBuf {
+    if let Some(folder) = &arguments.prior {
+        return folder.clone();
+    }
+    let trained = |folder: &str| root.join(folder).join(&scenario.robot.name);
+    let quick = arguments.quick.then(|| trained("runs/quick/priors"));
+    let candidates = quick.into_iter().chain([trained("runs/priors")]);
+    candidates.into_iter().find(|f| f.join("prior.json").is_file()).unwrap_or_else(|| trained("assets/priors"))
+}

@@ -1,0 +1,291 @@
+//! Run directories: identity, finished trials, resumption.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+
+use agent::Method;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::{Error, Table, TrialRecord};
+
+/// What decides the results of a run. A folder is resumed only by the same run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunIdentity {
+    /// Version of this file's format.
+    pub version: u32,
+    /// Hash of the resolved scenario.
+    pub scenario_hash: String,
+    /// Root seed.
+    pub seed: u64,
+    /// Hash of the prior's weights; `None` where no method needs one.
+    pub prior_hash: Option<String>,
+    /// Methods, in the order of the table.
+    pub methods: Vec<Method>,
+    /// Trials a method.
+    pub trials: u32,
+}
+
+/// Where results come from: the identity of the run and of the program.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// The run.
+    #[serde(flatten)]
+    pub run: RunIdentity,
+    /// Version of the program.
+    pub program: String,
+    /// Commit that it was built from.
+    pub commit: String,
+}
+
+/// A run directory.
+#[derive(Debug)]
+pub struct Run {
+    folder: PathBuf,
+    provenance: Provenance,
+    log: Mutex<File>,
+    finished: BTreeMap<(Method, u32), TrialRecord>,
+}
+
+impl Run {
+    /// Opens or creates `folder` for a run; reads the trials that are finished.
+    ///
+    /// # Errors
+    ///
+    /// A folder of another run, an unreadable record, a folder that cannot be written. Nothing is overwritten.
+    pub fn open(folder: &Path, provenance: Provenance, scenario_toml: &str) -> Result<Self, Error> {
+        let file_error = |file: &Path, action| {
+            let file = file.to_path_buf();
+            move |source| Error::File { file, action, source }
+        };
+        std::fs::create_dir_all(folder).map_err(file_error(folder, "creating the folder"))?;
+        let identity_file = folder.join("run.json");
+        match std::fs::read_to_string(&identity_file) {
+            Ok(text) => check_identity(&identity_file, &text, &provenance.run)?,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                write_atomically(&folder.join("scenario.toml"), scenario_toml.as_bytes())?;
+                write_atomically(&identity_file, pretty(&provenance.run).as_bytes())?;
+            }
+            Err(e) => return Err(file_error(&identity_file, "reading")(e)),
+        }
+        let log_file = folder.join("trials.jsonl");
+        let finished = read_trials(&log_file)?;
+        let log =
+            OpenOptions::new().create(true).append(true).open(&log_file).map_err(file_error(&log_file, "opening"))?;
+        Ok(Self { folder: folder.to_path_buf(), provenance, log: Mutex::new(log), finished })
+    }
+
+    /// Trials that are still to be played, methods in turn for each trial.
+    #[must_use]
+    pub fn missing(&self) -> Vec<(Method, u32)> {
+        let identity = &self.provenance.run;
+        (0..identity.trials)
+            .flat_map(|trial| identity.methods.iter().map(move |method| (*method, trial)))
+            .filter(|item| !self.finished.contains_key(item))
+            .collect()
+    }
+
+    /// Number of trials that were finished when the folder was opened.
+    #[must_use]
+    pub fn resumed(&self) -> usize {
+        self.finished.len()
+    }
+
+    /// Keeps a finished trial: one line, written at once, so that a kill leaves whole lines and at most one broken last one.
+    ///
+    /// # Errors
+    ///
+    /// Where the file cannot be written.
+    ///
+    /// # Panics
+    ///
+    /// If another thread panicked while writing.
+    pub fn keep(&self, record: &TrialRecord) -> Result<(), Error> {
+        let mut line = serde_json::to_string(record).expect("a record is plain data");
+        line.push('\n');
+        let mut log = self.log.lock().expect("no thread panics while it writes");
+        log.write_all(line.as_bytes()).and_then(|()| log.sync_data()).map_err(|source| Error::File {
+            file: self.folder.join("trials.jsonl"),
+            action: "writing",
+            source,
+        })
+    }
+
+    /// Writes the tables from all trials, in order.
+    ///
+    /// # Errors
+    ///
+    /// Where a file cannot be read or written.
+    pub fn finish(&self, domain: &str, robot: &str, preset: &str, published: &BTreeMap<String, scenario::Published>) -> Result<Table, Error> {
+        let log_file = self.folder.join("trials.jsonl");
+        let trials = read_trials(&log_file)?;
+        // In order of method and trial, whatever order they ended in.
+        let lines: String = trials
+            .values()
+            .map(|record| serde_json::to_string(record).expect("a record is plain data") + "\n")
+            .collect();
+        write_atomically(&log_file, lines.as_bytes())?;
+        let table = Table::new(domain, robot, preset, &self.provenance, trials.values(), published);
+        write_atomically(&self.folder.join("table.json"), pretty(&table).as_bytes())?;
+        write_atomically(&self.folder.join("table.md"), table.to_markdown().as_bytes())?;
+        write_atomically(&self.folder.join("table.csv"), table.to_csv().as_bytes())?;
+        Ok(table)
+    }
+}
+
+fn pretty<T: Serialize>(value: &T) -> String {
+    serde_json::to_string_pretty(value).expect("plain data has a JSON form") + "\n"
+}
+
+fn check_identity(file: &Path, text: &str, expected: &RunIdentity) -> Result<(), Error> {
+    let found: Value = serde_json::from_str(text).unwrap_or(Value::Null);
+    let expected = serde_json::to_value(expected).expect("plain data has a JSON form");
+    for (key, value) in expected.as_object().expect("a struct is an object") {
+        let other = found.get(key).unwrap_or(&Value::Null);
+        if other != value {
+            return Err(Error::OtherRun {
+                file: file.to_path_buf(),
+                key: key.clone(),
+                found: other.to_string(),
+                expected: value.to_string(),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Finished trials. A last line without its line feed is what a kill left of a write: it is dropped, and cut from the file so that the
+/// next record starts a line of its own.
+fn read_trials(file: &Path) -> Result<BTreeMap<(Method, u32), TrialRecord>, Error> {
+    let text = match std::fs::read_to_string(file) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
+        Err(source) => return Err(Error::File { file: file.to_path_buf(), action: "reading", source }),
+    };
+    let whole = text.rfind('\n').map_or(0, |at| at + 1);
+    if whole < text.len() {
+        let cut = OpenOptions::new().write(true).open(file).and_then(|f| f.set_len(whole as u64));
+        cut.map_err(|source| Error::File { file: file.to_path_buf(), action: "cutting a broken line", source })?;
+    }
+    let mut trials = BTreeMap::new();
+    for (index, line) in text[..whole].lines().enumerate() {
+        let record: TrialRecord = serde_json::from_str(line).map_err(|e| Error::Record {
+            file: file.to_path_buf(),
+            line: index + 1,
+            message: e.to_string(),
+        })?;
+        trials.entry((record.method, record.trial)).or_insert(record);
+    }
+    Ok(trials)
+}
+
+/// Writes a file whole or not at all.
+fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let error = |source| Error::File { file: path.to_path_buf(), action: "writing", source };
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(error)?;
+    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(error)?;
+    file.persist(path).map_err(|e| error(e.error))?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use agent::Reason;
+
+    use super::*;
+
+    fn provenance(seed: u64) -> Provenance {
+        Provenance {
+            run: RunIdentity {
+                version: 1,
+                scenario_hash: "abc".into(),
+                seed,
+                prior_hash: None,
+                methods: vec![Method::NoRnn, Method::Heuristic],
+                trials: 3,
+            },
+            program: "test".into(),
+            commit: "none".into(),
+        }
+    }
+
+    fn record(method: Method, trial: u32, success: bool) -> TrialRecord {
+        TrialRecord {
+            method,
+            trial,
+            seed: 1,
+            success,
+            reason: if success { Reason::Goal } else { Reason::Horizon },
+            steps: 4,
+            discounted_return: 0.5,
+            depletions: 0,
+            transitions: 10,
+            large_forces: 0,
+            has_obstacle: false,
+            obstacle_touched: false,
+            actions: vec![2; 4],
+            seconds: 0.1,
+        }
+    }
+
+    fn finish(run: &Run) -> Table {
+        run.finish("D1", "sawyer", "paper", &BTreeMap::new()).unwrap()
+    }
+
+    #[test]
+    fn a_killed_run_goes_on_and_ends_with_the_same_table() {
+        let whole = tempfile::tempdir().unwrap();
+        let run = Run::open(whole.path(), provenance(1), "").unwrap();
+        for (method, trial) in run.missing() {
+            run.keep(&record(method, trial, trial == 1)).unwrap();
+        }
+        let expected = finish(&run);
+
+        let killed = tempfile::tempdir().unwrap();
+        let run = Run::open(killed.path(), provenance(1), "").unwrap();
+        let items = run.missing();
+        assert_eq!(items.len(), 6);
+        // Out of order, and a kill in the middle of a write.
+        for &(method, trial) in [&items[4], &items[1]] {
+            run.keep(&record(method, trial, trial == 1)).unwrap();
+        }
+        drop(run);
+        let log = killed.path().join("trials.jsonl");
+        let mut text = std::fs::read_to_string(&log).unwrap();
+        text.push_str("{\"method\":\"no-rnn\",\"tri");
+        std::fs::write(&log, text).unwrap();
+        let run = Run::open(killed.path(), provenance(1), "").unwrap();
+        assert_eq!(run.resumed(), 2);
+        for (method, trial) in run.missing() {
+            run.keep(&record(method, trial, trial == 1)).unwrap();
+        }
+        assert_eq!(finish(&run), expected);
+        for file in ["trials.jsonl", "table.json", "table.md", "table.csv"] {
+            let (a, b) = (std::fs::read(whole.path().join(file)), std::fs::read(killed.path().join(file)));
+            assert_eq!(a.unwrap(), b.unwrap(), "{file}");
+        }
+    }
+
+    #[test]
+    fn a_folder_of_another_run_is_refused_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Run::open(folder.path(), provenance(1), "first").unwrap());
+        let message = Run::open(folder.path(), provenance(2), "second").unwrap_err().to_string();
+        assert!(message.contains("run.json") && message.contains("`seed` is 1, this run has 2"), "{message}");
+        assert_eq!(std::fs::read_to_string(folder.path().join("scenario.toml")).unwrap(), "first");
+    }
+
+    #[test]
+    fn a_broken_line_in_the_middle_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Run::open(folder.path(), provenance(1), "").unwrap());
+        let good = serde_json::to_string(&record(Method::NoRnn, 0, true)).unwrap();
+        std::fs::write(folder.path().join("trials.jsonl"), format!("{good}\nnonsense\n{good}\n")).unwrap();
+        let message = Run::open(folder.path(), provenance(1), "").unwrap_err().to_string();
+        assert!(message.contains("trials.jsonl: line 2"), "{message}");
+    }
+}

@@ -1,0 +1,171 @@
+//! The table of a run: JSON for machines, Markdown for people, CSV for spreadsheets.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use agent::{Method, Reason};
+use scenario::Published;
+use serde::{Deserialize, Serialize};
+
+use crate::{Provenance, TrialRecord, wilson95};
+
+/// A method's row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Domain.
+    pub domain: String,
+    /// Robot.
+    pub robot: String,
+    /// Preset.
+    pub preset: String,
+    /// Method.
+    pub method: Method,
+    /// Trials that reached the goal.
+    pub successes: u32,
+    /// Trials.
+    pub trials: u32,
+    /// Wilson interval of the success rate.
+    pub interval95: [f64; 2],
+    /// The paper's figure; null where it has none.
+    pub published: Option<Published>,
+    /// Trials by the reason they ended for.
+    pub reasons: BTreeMap<Reason, u32>,
+    /// Mean discounted return.
+    pub mean_return: f64,
+    /// Mean number of actions of the successful trials; null where none was.
+    pub mean_steps_to_goal: Option<f64>,
+    /// Updates in which no simulated particle agreed with the observation, per trial.
+    pub mean_depletions: f64,
+    /// Simulated transitions per action.
+    pub transitions_per_action: f64,
+    /// Trials whose world has an obstacle.
+    pub with_obstacle: u32,
+    /// Trials in which the object or the tool pushed against it.
+    pub obstacle_touched: u32,
+}
+
+/// The table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// One row a method.
+    pub rows: Vec<Row>,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+}
+
+impl Table {
+    /// Counts the trials of each method, in the order of the run.
+    pub(crate) fn new<'a>(
+        domain: &str,
+        robot: &str,
+        preset: &str,
+        provenance: &Provenance,
+        trials: impl Iterator<Item = &'a TrialRecord> + Clone,
+        published: &BTreeMap<String, Published>,
+    ) -> Self {
+        let row = |method: &Method| {
+            let of_method: Vec<&TrialRecord> = trials.clone().filter(|t| t.method == *method).collect();
+            let count = |filter: &dyn Fn(&TrialRecord) -> bool| of_method.iter().filter(|t| filter(t)).count() as u32;
+            let n = of_method.len() as u32;
+            let successes = count(&|t| t.success);
+            let mut reasons = BTreeMap::new();
+            for trial in &of_method {
+                *reasons.entry(trial.reason).or_insert(0) += 1;
+            }
+            let mean = |value: &dyn Fn(&TrialRecord) -> f64| {
+                of_method.iter().map(|t| value(t)).sum::<f64>() / f64::from(n.max(1))
+            };
+            let steps_to_goal: usize = of_method.iter().filter(|t| t.success).map(|t| t.steps).sum();
+            let actions: usize = of_method.iter().map(|t| t.steps).sum();
+            let transitions: usize = of_method.iter().map(|t| t.transitions).sum();
+            Row {
+                domain: domain.into(),
+                robot: robot.into(),
+                preset: preset.into(),
+                method: *method,
+                successes,
+                trials: n,
+                interval95: wilson95(successes, n),
+                published: published.get(method.name()).copied(),
+                reasons,
+                mean_return: mean(&|t| t.discounted_return),
+                mean_steps_to_goal: (successes > 0).then(|| steps_to_goal as f64 / f64::from(successes)),
+                mean_depletions: mean(&|t| t.depletions as f64),
+                transitions_per_action: transitions as f64 / actions.max(1) as f64,
+                with_obstacle: count(&|t| t.has_obstacle),
+                obstacle_touched: count(&|t| t.obstacle_touched),
+            }
+        };
+        Self { rows: provenance.run.methods.iter().map(row).collect(), provenance: provenance.clone() }
+    }
+
+    /// For people.
+    #[must_use]
+    pub fn to_markdown(&self) -> String {
+        let mut text = String::from(
+            "| domain | robot | preset | method | success | 95 % interval | paper | ended by | steps to goal | obstacle touched |\n\
+             |---|---|---|---|---|---|---|---|---|---|\n",
+        );
+        for row in &self.rows {
+            let published = row.published.map_or("–".into(), |p| format!("{}/{}", p.successes, p.trials));
+            let reasons: Vec<String> = row
+                .reasons
+                .iter()
+                .map(|(reason, count)| format!("{} {count}", format!("{reason:?}").to_lowercase()))
+                .collect();
+            let steps = row.mean_steps_to_goal.map_or("–".into(), |s| format!("{s:.1}"));
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} | {}/{} | {:.2}–{:.2} | {} | {} | {} | {} of {} |",
+                row.domain,
+                row.robot,
+                row.preset,
+                row.method.name(),
+                row.successes,
+                row.trials,
+                row.interval95[0],
+                row.interval95[1],
+                published,
+                reasons.join(", "),
+                steps,
+                row.obstacle_touched,
+                row.with_obstacle,
+            );
+        }
+        text
+    }
+
+    /// For spreadsheets.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let mut text = String::from(
+            "domain,robot,preset,method,successes,trials,interval95_low,interval95_high,published_successes,published_trials,\
+             mean_return,mean_steps_to_goal,mean_depletions,transitions_per_action,with_obstacle,obstacle_touched\n",
+        );
+        for row in &self.rows {
+            let published = row.published.map_or(",".into(), |p| format!("{},{}", p.successes, p.trials));
+            let steps = row.mean_steps_to_goal.map_or(String::new(), |s| s.to_string());
+            let _ = writeln!(
+                text,
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                row.domain,
+                row.robot,
+                row.preset,
+                row.method.name(),
+                row.successes,
+                row.trials,
+                row.interval95[0],
+                row.interval95[1],
+                published,
+                row.mean_return,
+                steps,
+                row.mean_depletions,
+                row.transitions_per_action,
+                row.with_obstacle,
+                row.obstacle_touched,
+            );
+        }
+        text
+    }
+}

@@ -1,0 +1,83 @@
+//! One trial: a drawn world, one method.
+
+use agent::{Agent, Episode, Method, Reason, SimulatedWorld};
+use pomdp::{Purpose, Seed};
+use prior::Suggester;
+use scenario::Problem;
+use serde::{Deserialize, Serialize};
+
+use crate::Error;
+
+/// What is kept of a trial: one line of `trials.jsonl`. All but `seconds` is a function of scenario, method, trial and seed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrialRecord {
+    /// Method.
+    pub method: Method,
+    /// Number of the trial, from 0; the same number means the same world for every method.
+    pub trial: u32,
+    /// Seed of the trial.
+    pub seed: u64,
+    /// The object reached the goal region.
+    pub success: bool,
+    /// Why it ended.
+    pub reason: Reason,
+    /// Actions taken.
+    pub steps: usize,
+    /// Σ γ^t r_t.
+    pub discounted_return: f64,
+    /// Updates in which no simulated particle agreed with the observation.
+    pub depletions: usize,
+    /// Transitions simulated for search and belief.
+    pub transitions: usize,
+    /// Actions with a force above the limit.
+    pub large_forces: usize,
+    /// The world has an obstacle.
+    pub has_obstacle: bool,
+    /// The object or the tool pushed against it.
+    pub obstacle_touched: bool,
+    /// Actions taken, by index.
+    pub actions: Vec<u8>,
+    /// Wall-clock time, s.
+    pub seconds: f64,
+}
+
+/// Plays trial number `trial` of `method` and reports it with its wall-clock time left at 0.
+///
+/// World, sensor noise, search, filter and suggestions have their own streams under the trial's seed, so methods share worlds and
+/// noise.
+///
+/// # Errors
+///
+/// [`Error::Trial`] with its cause.
+pub fn play(
+    problem: &Problem,
+    method: Method,
+    prior: Option<&Suggester>,
+    root: Seed,
+    trial: u32,
+) -> Result<(TrialRecord, Episode), Error> {
+    let failed = |source: agent::Error| Error::Trial { trial, method: method.name(), source };
+    let seed = root.child(Purpose::World, u64::from(trial));
+    let start = problem.sample_world(&mut seed.stream(Purpose::World, 0)).map_err(|e| failed(e.into()))?;
+    let has_obstacle = start.theta.obstacle.is_some();
+    let mut world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
+    let episode = Agent::new(problem, method, prior).and_then(|mut a| a.run(&mut world, seed)).map_err(failed)?;
+    let record = TrialRecord {
+        method,
+        trial,
+        seed: seed.0,
+        success: episode.success(),
+        reason: episode.reason,
+        steps: episode.steps.len(),
+        discounted_return: episode.discounted_return,
+        depletions: episode.depletions,
+        transitions: episode.transitions(),
+        large_forces: episode.steps.iter().filter(|s| s.large_force).count(),
+        has_obstacle,
+        obstacle_touched: episode.steps.iter().any(|s| s.obstacle_touched),
+        actions: episode.steps.iter().map(|s| s.action.into()).collect(),
+        seconds: 0.0,
+    };
+    Ok((record, episode))
+}

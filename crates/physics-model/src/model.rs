@@ -1,0 +1,315 @@
+//! The pushing task as a generative model over particles (s, Θ).
+
+use std::sync::Arc;
+
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
+use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng, Step};
+use serde::{Deserialize, Serialize};
+
+use crate::action::{Action, minimum_jerk};
+use crate::config::{ForceSensing, PushConfig};
+use crate::effect::{Effect, EffectConfig};
+use crate::error::Impossible;
+use crate::perturb;
+use crate::reward::Events;
+use crate::robot::Robot;
+use crate::sensor::{Observation, ObservationKey, Readings};
+use crate::state::State;
+use crate::theta::Theta;
+use crate::world::{ToolPose, World, Wrench, check_overlaps, check_theta};
+
+/// One hypothesis: state and parameters, with what of the past the rewards and the sensors need.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Particle {
+    /// s.
+    pub state: State,
+    /// Θ.
+    pub theta: Theta,
+    /// Whether the object has been moved in this episode: that reward is given once.
+    pub object_moved: bool,
+    /// Noise-free force readings of the last action (see [`Readings::force`]).
+    pub force: [f64; 6],
+}
+
+impl Particle {
+    /// A hypothesis at the start of an episode.
+    #[must_use]
+    pub fn new(state: State, theta: Theta) -> Self {
+        Self { state, theta, object_moved: false, force: [0.0; 6] }
+    }
+}
+
+/// What happened in an action, for records and statistics.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ActionReport {
+    /// Reward events.
+    pub events: Events,
+    /// The object or the tool pushed against the obstacle.
+    pub obstacle_touched: bool,
+    /// The tool touched something.
+    pub tool_touched: bool,
+}
+
+/// The simulator G(s, a | Θ) of the pushing task.
+#[derive(Clone, Debug)]
+pub struct PushModel {
+    config: PushConfig,
+    robot: Arc<Robot>,
+    effects: Arc<Vec<Box<dyn Effect>>>,
+    tool_orientation: UnitQuaternion<f64>,
+}
+
+impl PushModel {
+    /// A model of `robot` in the world, task and sensors of `config`.
+    #[must_use]
+    pub fn new(config: PushConfig, robot: Arc<Robot>) -> Self {
+        let effects = Arc::new(config.effects.iter().map(EffectConfig::build).collect());
+        let r = robot.tool_rotation();
+        let rotation = Matrix3::from_fn(|row, column| r[row][column]);
+        let tool_orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        Self { config, robot, effects, tool_orientation }
+    }
+
+    /// Configuration.
+    #[must_use]
+    pub fn config(&self) -> &PushConfig {
+        &self.config
+    }
+
+    /// The arm.
+    #[must_use]
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// Number of actuated joints.
+    #[must_use]
+    pub fn joint_count(&self) -> usize {
+        self.robot.joint_count()
+    }
+
+    /// Tool centre, m, base frame.
+    #[must_use]
+    pub fn tool_position_m(&self, joints_rad: &[f64]) -> [f64; 3] {
+        self.robot.base_from_tool(joints_rad).translation.vector.into()
+    }
+
+    /// Joint positions that bring the tool centre to `position_m` in its fixed orientation, starting from `seed_rad`; `None` where there
+    /// are none within the limits.
+    #[must_use]
+    pub fn joints_for(&self, seed_rad: &[f64], position_m: [f64; 3]) -> Option<Vec<f64>> {
+        let target = Isometry3::from_parts(Translation3::from(Vector3::from(position_m)), self.tool_orientation);
+        self.robot.solve_ik(seed_rad, &target).ok()
+    }
+
+    /// Whether the hypothesis can be a world at all.
+    ///
+    /// # Errors
+    ///
+    /// [`Impossible`]: a value out of its range, or bodies that overlap.
+    pub fn check(&self, particle: &Particle) -> Result<(), Impossible> {
+        check_theta(&particle.theta)?;
+        let state = &particle.state;
+        let tool = self.tool_pose(&state.joints_rad);
+        check_overlaps(
+            &self.config.world,
+            &particle.theta,
+            &state.object,
+            state.obstacle.as_ref(),
+            &tool,
+            self.robot.tool_shapes(),
+        )
+    }
+
+    /// What noise-free sensors would say in the state that `particle` is in.
+    #[must_use]
+    pub fn readings(&self, particle: &Particle) -> Readings {
+        Readings {
+            joints_rad: particle.state.joints_rad.clone(),
+            force: particle.force,
+            object: particle.state.object,
+        }
+    }
+
+    /// The force readings that an observation holds (see [`Readings::force`]).
+    #[must_use]
+    pub fn measured_force(&self, observation: &Observation) -> [f64; 6] {
+        let joints = self.joint_count();
+        let first = match self.config.sensor.force {
+            ForceSensing::Wrist => joints,
+            ForceSensing::JointTorques => 0,
+        };
+        let mut force = [0.0; 6];
+        for (slot, value) in force.iter_mut().zip(&observation.0[first..observation.0.len() - 7]) {
+            *slot = *value;
+        }
+        force
+    }
+
+    /// Whether noise-free sensors would put the particle into the class of `observation`.
+    #[must_use]
+    pub fn agrees(&self, particle: &Particle, observation: &Observation) -> bool {
+        self.key(&self.config.sensor.noise_free(&self.readings(particle))) == self.key(observation)
+    }
+
+    /// Observation before the first action: no contact force yet.
+    pub fn initial_observation(&self, particle: &mut Particle, rng: &mut Rng) -> Observation {
+        particle.force = self.force_readings(&particle.state.joints_rad, &Wrench::default());
+        self.config.sensor.observe(&self.readings(particle), rng)
+    }
+
+    /// One action, in place, with a report of what happened. The observation, reward and outcome are those of
+    /// [`GenerativeModel::step`].
+    pub fn act(&self, particle: &mut Particle, action: Action, rng: &mut Rng) -> (Step<Observation>, ActionReport) {
+        let task = &self.config.task;
+        let world_config = &self.config.world;
+        let tool = self.tool_pose(&particle.state.joints_rad);
+        let start = tool.position_m;
+        let direction = action.direction();
+        let target: [f64; 3] = std::array::from_fn(|i| start[i] + task.step_m * direction[i]);
+        let goal_joints =
+            if task.reach.contains(target) { self.joints_for(&particle.state.joints_rad, target) } else { None };
+        let mut report = ActionReport::default();
+        report.events.out_of_reach = goal_joints.is_none();
+
+        let mut world = World::restore(
+            world_config,
+            &self.effects,
+            &particle.theta,
+            &particle.state.object,
+            particle.state.obstacle.as_ref(),
+            &tool,
+            self.robot.tool_shapes(),
+        );
+        let mut mean = Wrench::default();
+        let mut position = start;
+        let mut stopped = goal_joints.is_none();
+        for step in 1..=world_config.control_steps {
+            if !stopped {
+                let share = minimum_jerk(f64::from(step) / f64::from(world_config.control_steps));
+                position = std::array::from_fn(|i| start[i] + share * (target[i] - start[i]));
+            }
+            let wrench = world.step(position);
+            mean.add_scaled(&wrench, 1.0 / f64::from(world_config.control_steps));
+            report.tool_touched |= wrench.force_magnitude_n() > 0.0;
+            report.obstacle_touched |= world.obstacle_touched();
+            if self.is_large(&particle.state.joints_rad, &wrench) {
+                // The arm's collision reaction: it stops where it is for the rest of the action.
+                report.events.large_force = true;
+                stopped = true;
+            }
+        }
+
+        if world.diverged() {
+            // The state stays as it was, so that nothing downstream meets a value that is not finite.
+            let observation = self.config.sensor.observe(&self.readings(particle), rng);
+            let reward = task.reward.reward(report.events);
+            return (Step { observation, reward, outcome: Outcome::Diverged }, report);
+        }
+        let before = particle.state.object.position_m;
+        particle.state.object = world.object();
+        particle.state.obstacle = world.obstacle();
+        if let Some(joints) = goal_joints {
+            // A move that was stopped early ends on the way to its target.
+            particle.state.joints_rad = if report.events.large_force {
+                self.joints_for(&particle.state.joints_rad, position).unwrap_or(joints)
+            } else {
+                joints
+            };
+        }
+        particle.force = self.force_readings(&particle.state.joints_rad, &mean);
+        let after = particle.state.object.position_m;
+        let moved = (0..3).map(|i| (after[i] - before[i]).powi(2)).sum::<f64>().sqrt();
+        report.events.first_moved = !particle.object_moved && moved > task.reward.moved_threshold_m;
+        particle.object_moved |= report.events.first_moved;
+        report.events.goal = task.goal.contains(after);
+        let observation = self.config.sensor.observe(&self.readings(particle), rng);
+        let outcome = if report.events.goal { Outcome::Terminal } else { Outcome::Continue };
+        (Step { observation, reward: task.reward.reward(report.events), outcome }, report)
+    }
+
+    fn tool_pose(&self, joints_rad: &[f64]) -> ToolPose {
+        let base_from_tool = self.robot.base_from_tool(joints_rad);
+        let q = base_from_tool.rotation;
+        ToolPose { position_m: base_from_tool.translation.vector.into(), orientation: [q.i, q.j, q.k, q.w] }
+    }
+
+    fn is_large(&self, joints_rad: &[f64], wrench: &Wrench) -> bool {
+        let limit = self.config.sensor.large_force_limit;
+        match self.config.sensor.force {
+            ForceSensing::Wrist => wrench.force_magnitude_n() > limit,
+            ForceSensing::JointTorques => {
+                wrench.force_magnitude_n() > 0.0
+                    && self.joint_torques(joints_rad, wrench).iter().any(|t| t.abs() > limit)
+            }
+        }
+    }
+
+    fn force_readings(&self, joints_rad: &[f64], wrench: &Wrench) -> [f64; 6] {
+        match self.config.sensor.force {
+            ForceSensing::Wrist => {
+                let base_from_wrist = self.robot.base_from_wrist(joints_rad);
+                let tool = self.robot.base_from_tool(joints_rad).translation.vector;
+                let force = Vector3::from(wrench.force_n);
+                let arm = tool - base_from_wrist.translation.vector;
+                let torque = Vector3::from(wrench.torque_nm) + arm.cross(&force);
+                let force = base_from_wrist.rotation.inverse_transform_vector(&force);
+                let torque = base_from_wrist.rotation.inverse_transform_vector(&torque);
+                [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+            }
+            ForceSensing::JointTorques => self.joint_torques(joints_rad, wrench),
+        }
+    }
+
+    /// Torques that the motors hold, N·m: gravity minus Jᵀ wrench; unused places are 0.
+    fn joint_torques(&self, joints_rad: &[f64], wrench: &Wrench) -> [f64; 6] {
+        let gravity = self.robot.gravity_torque(joints_rad);
+        let [fx, fy, fz] = wrench.force_n;
+        let [tx, ty, tz] = wrench.torque_nm;
+        let contact = self.robot.contact_torque(joints_rad, &Vector6::new(fx, fy, fz, tx, ty, tz));
+        let mut torques = [0.0; 6];
+        for (j, torque) in torques.iter_mut().enumerate().take(self.joint_count()) {
+            *torque = gravity[j] - contact[j];
+        }
+        torques
+    }
+}
+
+impl GenerativeModel for PushModel {
+    type State = Particle;
+    type Action = Action;
+    type Observation = Observation;
+
+    fn actions(&self) -> &[Action] {
+        &Action::ALL
+    }
+
+    fn step(&self, particle: &mut Particle, action: &Action, rng: &mut Rng) -> Step<Observation> {
+        self.act(particle, *action, rng).0
+    }
+
+    fn discount(&self) -> f64 {
+        self.config.task.discount
+    }
+}
+
+impl ObservationModel for PushModel {
+    fn log_likelihood(&self, _action: &Action, next: &Particle, observation: &Observation) -> f64 {
+        self.config.sensor.log_likelihood(observation, &self.readings(next))
+    }
+}
+
+impl Discretise for PushModel {
+    type Key = ObservationKey;
+
+    fn key(&self, observation: &Observation) -> ObservationKey {
+        self.config.sensor.key(observation, self.joint_count())
+    }
+}
+
+impl Perturb for PushModel {
+    fn perturb(&self, particle: &mut Particle, rng: &mut Rng) {
+        perturb::perturb(&self.config.perturb, self.config.world.table_height_m, particle, rng);
+    }
+}

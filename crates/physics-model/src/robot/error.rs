@@ -1,0 +1,117 @@
+//! Errors of arms and of inverse kinematics.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why an arm cannot be loaded. Messages name the URDF, the key of [`super::RobotConfig`] or of the URDF, and what was expected.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RobotError {
+    /// The URDF cannot be read.
+    #[error("robot.urdf = {}: cannot be read, expected a URDF file", .path.display())]
+    Read {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// The file is not URDF.
+    #[error("robot.urdf = {}: cannot be parsed, expected URDF", .path.display())]
+    Parse {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        source: urdf_rs::UrdfError,
+    },
+    /// A link of the configuration is not in the URDF, or does not descend from the base link.
+    #[error("robot.{key} = {name:?}: no such link below the base in {}, expected one of {known}", .path.display())]
+    UnknownLink {
+        /// URDF.
+        path: PathBuf,
+        /// Key of the configuration.
+        key: &'static str,
+        /// Name given.
+        name: String,
+        /// Names that would do.
+        known: String,
+    },
+    /// A joint of the configuration is not in the URDF.
+    #[error("robot.{key} has {name:?}: no such joint in {}, expected one of {known}", .path.display())]
+    UnknownJoint {
+        /// URDF.
+        path: PathBuf,
+        /// Key of the configuration.
+        key: &'static str,
+        /// Name given.
+        name: String,
+        /// Names that would do.
+        known: String,
+    },
+    /// A joint cannot play the part that it is given.
+    #[error("joint {joint:?} of {}: {problem}", .path.display())]
+    Joint {
+        /// URDF.
+        path: PathBuf,
+        /// Joint.
+        joint: String,
+        /// What is wrong and what was expected.
+        problem: String,
+    },
+    /// A link has impossible values or shapes.
+    #[error("link {link:?} of {}: {problem}", .path.display())]
+    Link {
+        /// URDF.
+        path: PathBuf,
+        /// Link.
+        link: String,
+        /// What is wrong and what was expected.
+        problem: String,
+    },
+    /// A list has not one entry for each joint.
+    #[error("robot.{key} of {robot:?} has {found} entries, expected {expected}")]
+    JointCount {
+        /// Name of the robot.
+        robot: String,
+        /// Key of the configuration.
+        key: &'static str,
+        /// Entries given.
+        found: usize,
+        /// What was expected.
+        expected: String,
+    },
+    /// A value of the configuration is out of its range.
+    #[error("robot.{key} of {robot:?} is {value}, expected {expected}")]
+    Value {
+        /// Name of the robot.
+        robot: String,
+        /// Key of the configuration.
+        key: String,
+        /// Value given.
+        value: String,
+        /// What was expected.
+        expected: String,
+    },
+}
+
+/// Why inverse kinematics has no solution.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum IkError {
+    /// The seed or the target holds a value that is not finite.
+    #[error("seed or target of inverse kinematics is not finite")]
+    NotFinite,
+    /// The iterations ended away from the target: it is out of reach, or only reachable on another branch.
+    #[error(
+        "inverse kinematics stopped after {iterations} iterations {position_error_m:.2e} m and {rotation_error_rad:.2e} rad \
+         from the target"
+    )]
+    NotConverged {
+        /// Distance that is left, m.
+        position_error_m: f64,
+        /// Angle that is left, rad.
+        rotation_error_rad: f64,
+        /// Iterations done.
+        iterations: u32,
+    },
+}

@@ -1,0 +1,293 @@
+//! From URDF to a chain: follows the actuated joints, freezes the others, lumps masses.
+//!
+//! Every link below the base belongs to the base or to the last actuated joint above it. A segment's frame is the URDF joint frame turned so
+//! that the joint's axis is +z; with the axis `0 0 1`, as in our files, that turn is exactly none.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
+use urdf_rs::JointType;
+
+use super::chain::{Chain, Frame, Inertia, Segment};
+use super::shapes::{ToolShape, link_shapes};
+use super::{JointLimit, RobotConfig, RobotError};
+use crate::state::MAX_JOINTS;
+
+/// A link: the segment that carries it (`None`: the base) and its fixed place there.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    pub(super) segment: Option<usize>,
+    pub(super) segment_from_link: Frame,
+}
+
+/// What the URDF says about an arm.
+#[derive(Debug)]
+pub(super) struct Arm {
+    pub(super) chain: Chain,
+    pub(super) limits: Vec<JointLimit>,
+    pub(super) links: BTreeMap<String, Placed>,
+    description: urdf_rs::Robot,
+}
+
+/// Reads a file.
+pub(super) fn read(path: &Path) -> Result<urdf_rs::Robot, RobotError> {
+    let text = std::fs::read_to_string(path).map_err(|source| RobotError::Read { path: path.into(), source })?;
+    urdf_rs::read_from_string(&text).map_err(|source| RobotError::Parse { path: path.into(), source })
+}
+
+impl Arm {
+    /// Builds the chain of `config.actuated_joints` below `config.base_link`.
+    pub(super) fn new(config: &RobotConfig, description: urdf_rs::Robot, path: &Path) -> Result<Self, RobotError> {
+        let joints = joint_table(&description, path)?;
+        check_names(config, &joints, path)?;
+        if !description.links.iter().any(|link| link.name == config.base_link) {
+            let names = description.links.iter().map(|link| link.name.as_str());
+            return Err(unknown_link(path, "base_link", &config.base_link, names));
+        }
+        let mut children: BTreeMap<&str, Vec<&urdf_rs::Joint>> = BTreeMap::new();
+        for joint in &description.joints {
+            children.entry(&joint.parent.link).or_default().push(joint);
+        }
+        let mut arm = Walk { config, path, children, links: BTreeMap::new(), segments: Vec::new(), limits: Vec::new() };
+        arm.visit(&config.base_link, None, &Frame::identity())?;
+        if let Some(missing) = config.actuated_joints.get(arm.segments.len()) {
+            let problem = match arm.segments.len().checked_sub(1) {
+                None => format!("does not move with {:?}, expected the first joint above the base", config.base_link),
+                Some(last) => {
+                    format!("does not move with {:?}, expected a serial chain", config.actuated_joints[last])
+                }
+            };
+            return Err(joint_error(path, missing, problem));
+        }
+        let Walk { links, mut segments, limits, .. } = arm;
+        for link in &description.links {
+            let Some(placed) = links.get(&link.name) else { continue };
+            let inertia = inertia(link, path)?;
+            if let Some(index) = placed.segment {
+                let segment: &mut Segment = &mut segments[index];
+                segment.inertia = segment.inertia.joined(&inertia.moved(&placed.segment_from_link));
+            }
+        }
+        for (segment, joint) in segments.iter().zip(&config.actuated_joints) {
+            if segment.inertia.mass_kg <= 0.0 {
+                return Err(joint_error(path, joint, "the links that it carries have no mass, expected some".into()));
+            }
+        }
+        Ok(Self { chain: Chain { segments }, limits, links, description })
+    }
+
+    /// The link called `name`, which `key` of the configuration asks for.
+    pub(super) fn link(&self, path: &Path, key: &'static str, name: &str) -> Result<&Placed, RobotError> {
+        self.links.get(name).ok_or_else(|| unknown_link(path, key, name, self.links.keys().map(String::as_str)))
+    }
+
+    /// Shapes of everything that `tool` is rigidly attached to, beyond the last joint, in the tool's frame.
+    pub(super) fn tool_shapes(&self, tool: &Placed, path: &Path) -> Result<Vec<ToolShape>, RobotError> {
+        let tool_from_segment = tool.segment_from_link.inverse();
+        let mut shapes = Vec::new();
+        for link in &self.description.links {
+            let Some(placed) = self.links.get(&link.name).filter(|placed| placed.segment == tool.segment) else {
+                continue;
+            };
+            let tool_from_link = tool_from_segment.then(&placed.segment_from_link);
+            shapes.extend(link_shapes(link, &tool_from_link).map_err(|problem| link_error(path, &link.name, problem))?);
+        }
+        Ok(shapes)
+    }
+}
+
+struct Walk<'a> {
+    config: &'a RobotConfig,
+    path: &'a Path,
+    children: BTreeMap<&'a str, Vec<&'a urdf_rs::Joint>>,
+    links: BTreeMap<String, Placed>,
+    segments: Vec<Segment>,
+    limits: Vec<JointLimit>,
+}
+
+impl<'a> Walk<'a> {
+    /// Places `link`, then all below it, depth first.
+    fn visit(&mut self, link: &str, segment: Option<usize>, segment_from_link: &Frame) -> Result<(), RobotError> {
+        let placed = Placed { segment, segment_from_link: *segment_from_link };
+        if self.links.insert(link.to_owned(), placed).is_some() {
+            return Err(link_error(self.path, link, "has two parents, expected a tree".into()));
+        }
+        let children: Vec<&'a urdf_rs::Joint> = self.children.get(link).cloned().unwrap_or_default();
+        for joint in children {
+            let origin = Frame::from_xyz_rpy(joint.origin.xyz.0, joint.origin.rpy.0);
+            if !origin.position.iter().chain(origin.rotation.iter()).all(|v| v.is_finite()) {
+                return Err(joint_error(self.path, &joint.name, "origin is not finite".into()));
+            }
+            let segment_from_joint = segment_from_link.then(&origin);
+            if let Some(index) = self.config.actuated_joints.iter().position(|name| *name == joint.name) {
+                if segment.map_or(0, |s| s + 1) != index || self.segments.len() != index {
+                    let problem = format!(
+                        "comes after {:?} in robot.actuated_joints but does not move with it, expected a serial chain in order",
+                        index.checked_sub(1).map_or("the base", |i| self.config.actuated_joints[i].as_str())
+                    );
+                    return Err(joint_error(self.path, &joint.name, problem));
+                }
+                let turn = joint_from_axis(&unit_axis(joint, self.path)?);
+                self.limits.push(limit(joint, self.path)?);
+                let mount = segment_from_joint.then(&turn);
+                self.segments.push(Segment { mount, inertia: Inertia::zero() });
+                self.visit(&joint.child.link, Some(index), &turn.inverse())?;
+            } else {
+                let frozen = frozen(joint, self.config.locked_joints.get(&joint.name), self.path)?;
+                self.visit(&joint.child.link, segment, &segment_from_joint.then(&frozen))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Joints by name, checked to be unique and to form no loop of links.
+fn joint_table<'a>(
+    description: &'a urdf_rs::Robot,
+    path: &Path,
+) -> Result<BTreeMap<&'a str, &'a urdf_rs::Joint>, RobotError> {
+    let mut joints = BTreeMap::new();
+    let mut parents = BTreeMap::new();
+    for joint in &description.joints {
+        if joints.insert(joint.name.as_str(), joint).is_some() {
+            return Err(joint_error(path, &joint.name, "occurs twice, expected unique names".into()));
+        }
+        for link in [&joint.parent.link, &joint.child.link] {
+            if !description.links.iter().any(|l| l.name == *link) {
+                return Err(joint_error(path, &joint.name, format!("connects link {link:?}, which does not exist")));
+            }
+        }
+        if let Some(other) = parents.insert(joint.child.link.as_str(), joint.name.as_str()) {
+            let problem = format!("has two parent joints, {other:?} and {:?}, expected a tree", joint.name);
+            return Err(link_error(path, &joint.child.link, problem));
+        }
+    }
+    Ok(joints)
+}
+
+fn check_names(
+    config: &RobotConfig,
+    joints: &BTreeMap<&str, &urdf_rs::Joint>,
+    path: &Path,
+) -> Result<(), RobotError> {
+    let actuated = config.actuated_joints.iter().map(|name| ("actuated_joints", name));
+    let locked = config.locked_joints.keys().map(|name| ("locked_joints", name));
+    for (key, name) in actuated.chain(locked) {
+        if !joints.contains_key(name.as_str()) {
+            let moving = joints.values().filter(|j| j.joint_type != JointType::Fixed).map(|j| j.name.as_str());
+            let known = moving.collect::<Vec<_>>().join(", ");
+            return Err(RobotError::UnknownJoint { path: path.into(), key, name: name.clone(), known });
+        }
+        if key == "actuated_joints" && config.locked_joints.contains_key(name) {
+            return Err(joint_error(path, name, "is in robot.actuated_joints and in robot.locked_joints".into()));
+        }
+    }
+    let count = config.actuated_joints.len();
+    let distinct = config.actuated_joints.iter().collect::<std::collections::BTreeSet<_>>().len();
+    if !(1..=MAX_JOINTS).contains(&count) || distinct != count {
+        return Err(RobotError::JointCount {
+            robot: config.name.clone(),
+            key: "actuated_joints",
+            found: distinct,
+            expected: format!("1 to {MAX_JOINTS} different joints"),
+        });
+    }
+    Ok(())
+}
+
+/// Joint frame ← link frame of a joint that does not move here.
+fn frozen(joint: &urdf_rs::Joint, locked: Option<&f64>, path: &Path) -> Result<Frame, RobotError> {
+    let position = match (&joint.joint_type, locked) {
+        (JointType::Fixed, None) => return Ok(Frame::identity()),
+        (JointType::Revolute | JointType::Continuous | JointType::Prismatic, Some(position)) => *position,
+        (kind, Some(_)) => {
+            let problem = format!("is {kind:?}, expected revolute, continuous or prismatic in robot.locked_joints");
+            return Err(joint_error(path, &joint.name, problem));
+        }
+        (kind, None) => {
+            let problem =
+                format!("is {kind:?}, expected it in robot.actuated_joints, or in robot.locked_joints with a value");
+            return Err(joint_error(path, &joint.name, problem));
+        }
+    };
+    let (lower, upper) = match joint.joint_type {
+        JointType::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
+        _ => (joint.limit.lower, joint.limit.upper),
+    };
+    if !(position.is_finite() && (lower..=upper).contains(&position)) {
+        let problem = format!("is locked at {position}, expected {lower} to {upper}");
+        return Err(joint_error(path, &joint.name, problem));
+    }
+    let axis = unit_axis(joint, path)?;
+    Ok(if joint.joint_type == JointType::Prismatic {
+        Frame { rotation: Matrix3::identity(), position: *axis * position }
+    } else {
+        Frame { rotation: *Rotation3::from_axis_angle(&axis, position).matrix(), position: Vector3::zeros() }
+    })
+}
+
+/// A turn that brings +z to the axis.
+fn joint_from_axis(axis: &Unit<Vector3<f64>>) -> Frame {
+    let rotation = if **axis == Vector3::z() {
+        Rotation3::identity()
+    } else {
+        let half_turn = || Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+        Rotation3::rotation_between(&Vector3::z(), axis).unwrap_or_else(half_turn)
+    };
+    Frame { rotation: *rotation.matrix(), position: Vector3::zeros() }
+}
+
+fn unit_axis(joint: &urdf_rs::Joint, path: &Path) -> Result<Unit<Vector3<f64>>, RobotError> {
+    let axis = Vector3::from(joint.axis.xyz.0);
+    Unit::try_new(axis, 1e-6)
+        .filter(|unit| unit.iter().all(|v| v.is_finite()))
+        .ok_or_else(|| joint_error(path, &joint.name, format!("axis is {:?}, expected a direction", joint.axis.xyz.0)))
+}
+
+fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> {
+    let (lower_rad, upper_rad) = match joint.joint_type {
+        JointType::Revolute => (joint.limit.lower, joint.limit.upper),
+        JointType::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
+        _ => {
+            let problem = format!("is {:?}, expected revolute or continuous in robot.actuated_joints", joint.joint_type);
+            return Err(joint_error(path, &joint.name, problem));
+        }
+    };
+    let (velocity_rps, effort_nm) = (joint.limit.velocity, joint.limit.effort);
+    if !(lower_rad < upper_rad && velocity_rps >= 0.0 && effort_nm >= 0.0) {
+        let problem = format!(
+            "limit is {lower_rad} to {upper_rad} rad, {velocity_rps} rad/s, {effort_nm} N m; expected lower below upper, others at least 0"
+        );
+        return Err(joint_error(path, &joint.name, problem));
+    }
+    Ok(JointLimit { lower_rad, upper_rad, velocity_rps, effort_nm })
+}
+
+fn inertia(link: &urdf_rs::Link, path: &Path) -> Result<Inertia, RobotError> {
+    let (mass_kg, i) = (link.inertial.mass.value, &link.inertial.inertia);
+    let origin = Frame::from_xyz_rpy(link.inertial.origin.xyz.0, link.inertial.origin.rpy.0);
+    let moment = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+    let finite = moment.iter().chain(origin.position.iter()).chain(origin.rotation.iter()).all(|v| v.is_finite());
+    if !(mass_kg.is_finite() && mass_kg >= 0.0 && finite) {
+        let problem = format!("inertial has mass {mass_kg} kg, expected at least 0, and finite values");
+        return Err(link_error(path, &link.name, problem));
+    }
+    if mass_kg > 0.0 && moment.symmetric_eigenvalues().min() <= 0.0 {
+        return Err(link_error(path, &link.name, "inertia is not positive definite, expected it to be".into()));
+    }
+    Ok(Inertia { mass_kg, com: Vector3::zeros(), moment }.moved(&origin))
+}
+
+fn unknown_link<'a>(path: &Path, key: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> RobotError {
+    let known = known.collect::<Vec<_>>().join(", ");
+    RobotError::UnknownLink { path: path.into(), key, name: name.into(), known }
+}
+
+fn joint_error(path: &Path, joint: &str, problem: String) -> RobotError {
+    RobotError::Joint { path: path.into(), joint: joint.into(), problem }
+}
+
+fn link_error(path: &Path, link: &str, problem: String) -> RobotError {
+    RobotError::Link { path: path.into(), link: link.into(), problem }
+}

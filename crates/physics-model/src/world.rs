@@ -1,0 +1,497 @@
+//! A rapier world built afresh from (s, Θ).
+//!
+//! A world is never reset in place: setting poses in a used world leaves solver caches behind, so that its future would
+//! depend on its past. A fresh one costs about a microsecond and is a pure function of (s, Θ).
+//!
+//! Friction is rapier's Coulomb model with contact recycling off: the default model puts friction at the unweighted centre
+//! of the contacts, which hides the centre of mass, and recycled contacts change friction.
+
+use rapier3d::prelude::{
+    Ball, CoefficientCombineRule, ColliderBuilder, ColliderHandle, Cuboid, Cylinder, FrictionModel, MassProperties,
+    PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape, SpringCoefficients, Vector,
+};
+
+use crate::config::{ObstacleMobility, WorldConfig};
+use crate::effect::{BodyView, Effect, Load, Surroundings};
+use crate::error::Impossible;
+use crate::robot::ToolShape;
+use crate::state::BodyState;
+use crate::theta::{ObjectShape, Theta};
+
+/// Deepest overlap, m, at which two bodies may be restored: what soft contacts reach in a hard push, and no more.
+pub const OVERLAP_LIMIT_M: f64 = 0.006;
+/// Fastest body, m/s, that a push of 0.1 m/s can plausibly cause.
+const SPEED_LIMIT_MPS: f64 = 5.0;
+/// Height over the table, m, below which a body's centre has sunk into it.
+const SUNK_LIMIT_M: f64 = 0.004;
+
+/// Pose of the tool: position in m and unit quaternion x, y, z, w, base frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToolPose {
+    /// Tool centre, m.
+    pub position_m: [f64; 3],
+    /// R(base ← tool).
+    pub orientation: [f64; 4],
+}
+
+/// Force and torque that the world exerts on the tool, about the tool centre, base axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Force, N.
+    pub force_n: [f64; 3],
+    /// Torque about the tool centre, N·m.
+    pub torque_nm: [f64; 3],
+}
+
+impl Wrench {
+    /// Adds `weight` times `other`.
+    pub fn add_scaled(&mut self, other: &Self, weight: f64) {
+        for i in 0..3 {
+            self.force_n[i] += weight * other.force_n[i];
+            self.torque_nm[i] += weight * other.torque_nm[i];
+        }
+    }
+
+    /// Magnitude of the force, N.
+    #[must_use]
+    pub fn force_magnitude_n(&self) -> f64 {
+        self.force_n.iter().map(|v| v * v).sum::<f64>().sqrt()
+    }
+}
+
+struct Body {
+    handle: RigidBodyHandle,
+    collider: ColliderHandle,
+    shape: ObjectShape,
+    mass_kg: f64,
+    half_height_m: f64,
+    radius_m: f64,
+    dynamic: bool,
+}
+
+/// A live world: table, tool, object and perhaps an obstacle.
+pub struct World<'a> {
+    config: &'a WorldConfig,
+    effects: &'a [Box<dyn Effect>],
+    physics: PhysicsWorld,
+    tool: RigidBodyHandle,
+    tool_colliders: Vec<ColliderHandle>,
+    object: Body,
+    obstacle: Option<Body>,
+}
+
+impl<'a> World<'a> {
+    /// Builds the world of `theta` in the state given by the bodies and the tool pose. Values must have passed
+    /// [`check_theta`].
+    #[must_use]
+    pub fn restore(
+        config: &'a WorldConfig,
+        effects: &'a [Box<dyn Effect>],
+        theta: &Theta,
+        object: &BodyState,
+        obstacle: Option<&BodyState>,
+        tool: &ToolPose,
+        tool_shapes: &[ToolShape],
+    ) -> Self {
+        let mut physics = PhysicsWorld::new();
+        let mut gravity = [0.0, 0.0, -config.gravity_mps2];
+        for effect in effects {
+            effect.gravity(&mut gravity);
+        }
+        physics.gravity = vector(gravity);
+        let parameters = &mut physics.integration_parameters;
+        parameters.dt = config.control_period_secs as f32;
+        parameters.num_solver_iterations = config.solver_iterations as usize;
+        parameters.friction_model = FrictionModel::Coulomb;
+        parameters.contact_recycling = false;
+        parameters.contact_clustering = false;
+        parameters.max_ccd_substeps = 0;
+        let softness = SpringCoefficients {
+            natural_frequency: config.contact_frequency_hz as f32,
+            damping_ratio: config.contact_damping_ratio as f32,
+        };
+        parameters.contact_softness = softness;
+        parameters.static_contact_softness = softness;
+
+        physics.insert(
+            RigidBodyBuilder::fixed().translation(vector([0.0, 0.0, config.table_height_m])),
+            material(ColliderBuilder::new(SharedShape::halfspace(Vector::Z)), 1.0, config),
+        );
+        let object_body = insert_body(&mut physics, config, true, &BodySpec::object(theta), object);
+        let obstacle_body = match (&theta.obstacle, obstacle) {
+            (Some(parameters), Some(state)) => {
+                let spec = BodySpec {
+                    shape: parameters.shape,
+                    size_m: parameters.size_m,
+                    mass_kg: parameters.mass_kg,
+                    com_m: [0.0; 3],
+                    friction: config.obstacle_friction,
+                };
+                let movable = config.obstacle_mobility == ObstacleMobility::Movable;
+                Some(insert_body(&mut physics, config, movable, &spec, state))
+            }
+            _ => None,
+        };
+        let tool_body = physics
+            .insert_body(RigidBodyBuilder::kinematic_position_based().pose(pose(tool.position_m, tool.orientation)));
+        let tool_colliders = tool_shapes
+            .iter()
+            .map(|shape| {
+                let builder = match shape {
+                    ToolShape::Ball { center_m, radius_m } => {
+                        ColliderBuilder::ball(*radius_m as f32).translation(vector(*center_m))
+                    }
+                    ToolShape::Capsule { a_m, b_m, radius_m } => {
+                        ColliderBuilder::capsule_from_endpoints(vector(*a_m), vector(*b_m), *radius_m as f32)
+                    }
+                };
+                physics.insert_collider(material(builder, config.tool_friction, config), Some(tool_body))
+            })
+            .collect();
+        Self {
+            config,
+            effects,
+            physics,
+            tool: tool_body,
+            tool_colliders,
+            object: object_body,
+            obstacle: obstacle_body,
+        }
+    }
+
+    /// Advances one control step, at whose end the tool is at `position_m` (base frame); its orientation stays.
+    /// Returns the mean wrench on the tool during the step.
+    pub fn step(&mut self, position_m: [f64; 3]) -> Wrench {
+        self.apply_effects();
+        self.physics.bodies[self.tool].set_next_kinematic_translation(vector(position_m));
+        self.physics.step();
+        self.tool_wrench(position_m)
+    }
+
+    /// State of the object.
+    #[must_use]
+    pub fn object(&self) -> BodyState {
+        self.body_state(&self.object)
+    }
+
+    /// State of the obstacle.
+    #[must_use]
+    pub fn obstacle(&self) -> Option<BodyState> {
+        self.obstacle.as_ref().map(|body| self.body_state(body))
+    }
+
+    /// Whether a body is not finite, flies, or has sunk into the table: the hypothesis is impossible.
+    #[must_use]
+    pub fn diverged(&self) -> bool {
+        std::iter::once(&self.object).chain(&self.obstacle).any(|body| {
+            let state = self.body_state(body);
+            let speed = state.linear_mps.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let finite = state.to_array().iter().all(|v| v.is_finite());
+            !finite || speed > SPEED_LIMIT_MPS || state.position_m[2] < self.config.table_height_m + SUNK_LIMIT_M
+        })
+    }
+
+    /// Whether the object or the tool touches the obstacle.
+    #[must_use]
+    pub fn obstacle_touched(&self) -> bool {
+        self.obstacle.as_ref().is_some_and(|obstacle| {
+            std::iter::once(&self.object.collider).chain(&self.tool_colliders).any(|other| {
+                self.physics
+                    .narrow_phase
+                    .contact_pair(obstacle.collider, *other)
+                    .is_some_and(|pair| pair.total_impulse_magnitude() > 0.0)
+            })
+        })
+    }
+
+    fn apply_effects(&mut self) {
+        if self.effects.is_empty() {
+            return;
+        }
+        let surroundings =
+            Surroundings { gravity_mps2: self.config.gravity_mps2, period_secs: self.config.control_period_secs };
+        for body in std::iter::once(&self.object).chain(&self.obstacle) {
+            if !body.dynamic {
+                continue;
+            }
+            let rigid = &mut self.physics.bodies[body.handle];
+            let height = f64::from(rigid.translation().z) - self.config.table_height_m;
+            let view = BodyView {
+                mass_kg: body.mass_kg,
+                rolling_radius_m: (body.shape == ObjectShape::Sphere).then_some(body.radius_m),
+                on_table: height < body.half_height_m + 0.002,
+                linear_mps: array(rigid.linvel()),
+                angular_rps: array(rigid.angvel()),
+            };
+            let mut load = Load::default();
+            for effect in self.effects {
+                effect.load(&surroundings, &view, &mut load);
+            }
+            rigid.reset_forces(false);
+            rigid.reset_torques(false);
+            rigid.add_force(vector(load.force_n), true);
+            rigid.add_torque(vector(load.torque_nm), true);
+        }
+    }
+
+    fn body_state(&self, body: &Body) -> BodyState {
+        let rigid = &self.physics.bodies[body.handle];
+        let rotation = rigid.rotation();
+        let angular = rigid.angvel();
+        // rapier's linear velocity is that of the centre of mass; ours is that of the centre of the shape.
+        let arm = rigid.translation() - rigid.center_of_mass();
+        BodyState {
+            position_m: array(rigid.translation()),
+            orientation: [rotation.x, rotation.y, rotation.z, rotation.w].map(f64::from),
+            linear_mps: array(rigid.linvel() + angular.cross(arm)),
+            angular_rps: array(angular),
+        }
+    }
+
+    /// Sum over the tool's contacts of normal and friction impulse, over the step's duration: the impulses total all
+    /// substeps.
+    fn tool_wrench(&self, center_m: [f64; 3]) -> Wrench {
+        let center = vector(center_m);
+        let mut force = Vector::ZERO;
+        let mut torque = Vector::ZERO;
+        for collider in &self.tool_colliders {
+            for pair in self.physics.narrow_phase.contact_pairs_with(*collider) {
+                let tool_is_first = pair.collider1 == *collider;
+                for manifold in pair.solver_manifolds() {
+                    // The solver pushes the first body along −normal.
+                    let away = -manifold.data.normal;
+                    for point in manifold.contacts() {
+                        let data = &point.data;
+                        let impulse = away * data.impulse + tangential_impulse(data, away);
+                        let (impulse, local) =
+                            if tool_is_first { (impulse, point.local_p1) } else { (-impulse, point.local_p2) };
+                        let at = self.physics.colliders[*collider].position().transform_point(local);
+                        force += impulse;
+                        torque += (at - center).cross(impulse);
+                    }
+                }
+            }
+        }
+        let rate = 1.0 / self.config.control_period_secs;
+        Wrench { force_n: array(force).map(|v| v * rate), torque_nm: array(torque).map(|v| v * rate) }
+    }
+}
+
+/// Friction impulse of a contact in world axes, on the first body.
+///
+/// rapier gives the total in the solver's tangent basis, which it does not expose; the last substep's impulse is given both in
+/// that basis and in world axes, which reveals the basis.
+fn tangential_impulse(data: &rapier3d::geometry::ContactData, away: Vector) -> Vector {
+    let last = data.warmstart_tangent_impulse;
+    let squared = last.x * last.x + last.y * last.y;
+    if squared < 1e-20 {
+        return Vector::ZERO;
+    }
+    let world = data.warmstart_tangent_world;
+    let first = (world * last.x - away.cross(world) * last.y) / squared;
+    first * data.tangent_impulse.x + away.cross(first) * data.tangent_impulse.y
+}
+
+struct BodySpec {
+    shape: ObjectShape,
+    size_m: [f64; 3],
+    mass_kg: f64,
+    com_m: [f64; 3],
+    friction: f64,
+}
+
+impl BodySpec {
+    fn object(theta: &Theta) -> Self {
+        let o = &theta.object;
+        Self { shape: o.shape, size_m: o.size_m, mass_kg: o.mass_kg, com_m: o.com_m, friction: o.friction }
+    }
+
+    /// Principal inertia, kg m², of a uniform solid about its centre, body axes.
+    fn inertia_kgm2(&self) -> [f64; 3] {
+        let m = self.mass_kg;
+        let [a, b, c] = self.size_m;
+        match self.shape {
+            ObjectShape::Box => [b * b + c * c, a * a + c * c, a * a + b * b].map(|v| m * v / 12.0),
+            ObjectShape::Cylinder => {
+                let across = m * (3.0 * a * a + b * b) / 12.0;
+                [across, across, m * a * a / 2.0]
+            }
+            ObjectShape::Sphere => [0.4 * m * a * a; 3],
+        }
+    }
+}
+
+fn insert_body(
+    physics: &mut PhysicsWorld,
+    config: &WorldConfig,
+    movable: bool,
+    spec: &BodySpec,
+    state: &BodyState,
+) -> Body {
+    let pose = pose(state.position_m, state.orientation);
+    let mut builder = if movable {
+        let angular = vector(state.angular_rps);
+        let arm = pose.transform_vector(vector(spec.com_m));
+        RigidBodyBuilder::dynamic().linvel(vector(state.linear_mps) + angular.cross(arm)).angvel(angular).can_sleep(false)
+    } else {
+        RigidBodyBuilder::fixed()
+    };
+    builder = builder.pose(pose).additional_mass_properties(MassProperties::new(
+        vector(spec.com_m),
+        spec.mass_kg as f32,
+        vector(spec.inertia_kgm2()),
+    ));
+    let collider = ColliderBuilder::new(shared_shape(spec.shape, spec.size_m))
+        .rotation(shape_axis_angle(spec.shape))
+        .density(0.0);
+    let (handle, collider) = physics.insert(builder, material(collider, spec.friction, config));
+    Body {
+        handle,
+        collider,
+        shape: spec.shape,
+        mass_kg: spec.mass_kg,
+        half_height_m: spec.shape.half_height_m(spec.size_m),
+        radius_m: spec.size_m[0],
+        dynamic: movable,
+    }
+}
+
+fn material(builder: ColliderBuilder, friction: f64, config: &WorldConfig) -> ColliderBuilder {
+    builder
+        .friction(friction as f32)
+        .friction_combine_rule(CoefficientCombineRule::Min)
+        .restitution(config.restitution as f32)
+        .restitution_combine_rule(CoefficientCombineRule::Max)
+}
+
+fn shared_shape(shape: ObjectShape, size_m: [f64; 3]) -> SharedShape {
+    let [a, b, c] = size_m.map(|v| v as f32);
+    match shape {
+        ObjectShape::Box => SharedShape::new(Cuboid::new(Vector::new(a, b, c) / 2.0)),
+        ObjectShape::Cylinder => SharedShape::new(Cylinder::new(b / 2.0, a)),
+        ObjectShape::Sphere => SharedShape::new(Ball::new(a)),
+    }
+}
+
+/// parry's cylinders stand along y, ours along z.
+fn shape_axis_angle(shape: ObjectShape) -> Vector {
+    match shape {
+        ObjectShape::Cylinder => Vector::new(std::f32::consts::FRAC_PI_2, 0.0, 0.0),
+        ObjectShape::Box | ObjectShape::Sphere => Vector::ZERO,
+    }
+}
+
+/// Checks the values of Θ against their physical range: finite, positive masses and sizes, friction in [0, 1], centre of mass
+/// within the shape's largest size.
+///
+/// # Errors
+///
+/// [`Impossible`], naming the value and its range.
+pub fn check_theta(theta: &Theta) -> Result<(), Impossible> {
+    let range = |what, value: f64, low: f64, high: f64| {
+        if !value.is_finite() {
+            Err(Impossible::NotFinite { what })
+        } else if value < low || value > high {
+            Err(Impossible::OutOfRange { what, value, low, high })
+        } else {
+            Ok(())
+        }
+    };
+    let object = &theta.object;
+    range("object mass (kg)", object.mass_kg, 0.005, 100.0)?;
+    range("object friction", object.friction, 0.0, 1.0)?;
+    for size in &object.size_m[..object.shape.size_count()] {
+        range("object size (m)", *size, 0.005, 1.0)?;
+    }
+    for (axis, com) in object.com_m.iter().enumerate() {
+        let half = match (object.shape, axis) {
+            (ObjectShape::Box, _) => object.size_m[axis] / 2.0,
+            (ObjectShape::Cylinder, 2) => object.size_m[1] / 2.0,
+            _ => object.size_m[0],
+        };
+        range("object centre of mass (m)", *com, -half, half)?;
+    }
+    if let Some(obstacle) = &theta.obstacle {
+        range("obstacle mass (kg)", obstacle.mass_kg, 0.005, 1000.0)?;
+        for size in &obstacle.size_m[..obstacle.shape.size_count()] {
+            range("obstacle size (m)", *size, 0.005, 1.0)?;
+        }
+    }
+    Ok(())
+}
+
+/// Checks that the bodies of a hypothesis do not overlap more than soft contacts do, and that none has sunk into the table.
+///
+/// # Errors
+///
+/// [`Impossible`], naming the bodies or values.
+pub fn check_overlaps(
+    config: &WorldConfig,
+    theta: &Theta,
+    object: &BodyState,
+    obstacle: Option<&BodyState>,
+    tool: &ToolPose,
+    tool_shapes: &[ToolShape],
+) -> Result<(), Impossible> {
+    let body = |shape, size_m, state: &BodyState| {
+        let local = Pose::rotation(shape_axis_angle(shape));
+        (pose(state.position_m, state.orientation) * local, shared_shape(shape, size_m))
+    };
+    let mut bodies = vec![("object", body(theta.object.shape, theta.object.size_m, object))];
+    if let (Some(parameters), Some(state)) = (&theta.obstacle, obstacle) {
+        bodies.push(("obstacle", body(parameters.shape, parameters.size_m, state)));
+    }
+    for (what, (at, shape)) in &bodies {
+        if !at.is_finite() {
+            return Err(Impossible::NotFinite { what });
+        }
+        let lowest = f64::from(shape.compute_aabb(at).mins.z) - config.table_height_m;
+        if lowest < -OVERLAP_LIMIT_M {
+            return Err(Impossible::Overlap {
+                first: what,
+                second: "table",
+                depth_m: -lowest,
+                limit_m: OVERLAP_LIMIT_M,
+            });
+        }
+    }
+    let base_from_tool = pose(tool.position_m, tool.orientation);
+    let tool_parts = tool_shapes.iter().map(|shape| match shape {
+        ToolShape::Ball { center_m, radius_m } => {
+            (base_from_tool * Pose::from_translation(vector(*center_m)), SharedShape::ball(*radius_m as f32))
+        }
+        ToolShape::Capsule { a_m, b_m, radius_m } => {
+            (base_from_tool, SharedShape::capsule(vector(*a_m), vector(*b_m), *radius_m as f32))
+        }
+    });
+    let mut pairs = Vec::new();
+    for part in tool_parts {
+        for (name, other) in &bodies {
+            pairs.push(("tool", part.clone(), *name, other.clone()));
+        }
+    }
+    if let [(first, a), (second, b)] = bodies.as_slice() {
+        pairs.push((first, a.clone(), second, b.clone()));
+    }
+    for (first, (pose_a, a), second, (pose_b, b)) in pairs {
+        let contact = rapier3d::parry::query::contact(&pose_a, &*a, &pose_b, &*b, 0.0).ok().flatten();
+        let depth_m = contact.map_or(0.0, |c| -f64::from(c.dist));
+        if depth_m > OVERLAP_LIMIT_M {
+            return Err(Impossible::Overlap { first, second, depth_m, limit_m: OVERLAP_LIMIT_M });
+        }
+    }
+    Ok(())
+}
+
+fn vector(v: [f64; 3]) -> Vector {
+    Vector::new(v[0] as f32, v[1] as f32, v[2] as f32)
+}
+
+fn array(v: Vector) -> [f64; 3] {
+    [v.x, v.y, v.z].map(f64::from)
+}
+
+fn pose(position_m: [f64; 3], orientation: [f64; 4]) -> Pose {
+    let [x, y, z, w] = orientation.map(|v| v as f32);
+    Pose::from_parts(vector(position_m), Rotation::from_xyzw(x, y, z, w).normalize())
+}

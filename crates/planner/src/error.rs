@@ -1,0 +1,17 @@
+//! What can go wrong before a search starts.
+
+/// Errors of the planner.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A configured value lies outside its limits.
+    #[error("planner: `{key}` is {value}, but must be {limit}")]
+    Config {
+        /// Key as written in the scenario file.
+        key: &'static str,
+        /// Offending value.
+        value: String,
+        /// What would be accepted.
+        limit: String,
+    },
+}

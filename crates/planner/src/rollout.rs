@@ -1,0 +1,82 @@
+//! The tail of a simulation below the tree: the default policy to the horizon.
+
+use pomdp::{GenerativeModel, Outcome, Policy, Rng};
+
+/// What a rollout brought.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rollout {
+    /// Σ γ^t r_t from the first action of the rollout on.
+    pub(crate) discounted_return: f64,
+    pub(crate) transitions: usize,
+    /// How the last step ended; `Continue` where the rollout was cut by its length.
+    pub(crate) outcome: Outcome,
+}
+
+/// Follows `policy` in place from `state` for at most `actions` actions.
+pub(crate) fn rollout<M, P>(model: &M, policy: &P, state: &mut M::State, actions: usize, rng: &mut Rng) -> Rollout
+where
+    M: GenerativeModel,
+    P: Policy<M> + ?Sized,
+{
+    let mut result = Rollout { discounted_return: 0.0, transitions: 0, outcome: Outcome::Continue };
+    let mut weight = 1.0;
+    while result.transitions < actions && result.outcome == Outcome::Continue {
+        let action = policy.action(model, state, rng);
+        let step = model.step(state, &action, rng);
+        result.discounted_return += weight * step.reward;
+        result.transitions += 1;
+        result.outcome = step.outcome;
+        weight *= model.discount();
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use pomdp::{Purpose, Seed, Step, UniformPolicy};
+
+    use super::*;
+
+    /// Pays 1 an action and ends at the given count, in the given way.
+    struct Countdown(Outcome);
+
+    impl GenerativeModel for Countdown {
+        type State = usize;
+        type Action = ();
+        type Observation = ();
+
+        fn actions(&self) -> &[()] {
+            &[()]
+        }
+
+        fn step(&self, left: &mut usize, (): &(), _rng: &mut Rng) -> Step<()> {
+            *left -= 1;
+            let outcome = if *left == 0 { self.0 } else { Outcome::Continue };
+            Step { observation: (), reward: 1.0, outcome }
+        }
+
+        fn discount(&self) -> f64 {
+            0.5
+        }
+    }
+
+    fn run(ending: Outcome, mut left: usize, actions: usize) -> Rollout {
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        rollout(&Countdown(ending), &UniformPolicy, &mut left, actions, &mut rng)
+    }
+
+    #[test]
+    fn the_return_is_the_geometric_sum_to_the_cut() {
+        // 1 + 1/2 + 1/4 + 1/8
+        let expected = Rollout { discounted_return: 1.875, transitions: 4, outcome: Outcome::Continue };
+        assert_eq!(run(Outcome::Terminal, 100, 4), expected);
+        assert_eq!(run(Outcome::Terminal, 100, 0).discounted_return, 0.0);
+    }
+
+    #[test]
+    fn terminal_and_diverged_worlds_end_a_rollout_with_their_last_reward() {
+        for ending in [Outcome::Terminal, Outcome::Diverged] {
+            assert_eq!(run(ending, 2, 10), Rollout { discounted_return: 1.5, transitions: 2, outcome: ending });
+        }
+    }
+}

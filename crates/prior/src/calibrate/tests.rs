@@ -1,0 +1,88 @@
+use super::*;
+use crate::layout::tests::layout;
+use crate::parameters::Parameters;
+use crate::parameters::tests::dimensions;
+use pomdp::{Purpose, Rng, Seed};
+use rand::RngExt as _;
+use rand_distr::StandardNormal;
+
+/// An inference that ignores its input and always suggests: y₀ ~ N(2, 3²), y₁ ~ N(0, 1) if the class is 1, and
+/// P(class 0) = P(class 1) = 1/2, told by two components, one a class.
+fn fixed_inference() -> (Inference, Layout, Normalisation) {
+    let sizes = dimensions(1, 2, &[2], &[2], 2);
+    let mut parameters = Parameters::zeros(&sizes);
+    // Means in normalised units: component 0 is lost on y₁.
+    parameters.tensors[6] = vec![0.0, 40.0, 0.0, 0.0];
+    parameters.tensors[10] = vec![9.0, -9.0, -9.0, 9.0];
+    let mut layout = layout(1, 2, &[2]);
+    layout.classes[0].labels[0] = "none".into();
+    let scale = |mean, stddev| Scale { mean, stddev };
+    let normalisation =
+        Normalisation { observation: vec![scale(0.0, 1.0)], continuous: vec![scale(2.0, 3.0), scale(0.0, 1.0)] };
+    (Inference::new(&sizes, &normalisation, &parameters), layout, normalisation)
+}
+
+/// Episodes drawn from what the inference suggests, the spread of y₀ times `spread`.
+fn episodes(count: usize, spread: f32, rng: &mut Rng) -> Vec<Sequence> {
+    let normal = |rng: &mut Rng| rng.sample::<f32, _>(StandardNormal);
+    let mut draw = |_| {
+        let class = u8::from(rng.random::<bool>());
+        let rows: Vec<f32> = (0..4).map(|i| if i % 2 == 0 { 2.0 + 3.0 * spread * normal(rng) } else { normal(rng) }).collect();
+        let mask = [1.0, f32::from(class)].repeat(2);
+        Sequence { observations: vec![0.0; 2], targets: rows, mask, classes: vec![class; 2], steps: 2 }
+    };
+    (0..count).map(&mut draw).collect()
+}
+
+fn report(count: usize, spread: f32) -> Calibration {
+    let (inference, layout, normalisation) = fixed_inference();
+    let sequences = episodes(count, spread, &mut Seed(4).stream(Purpose::Test, 0));
+    let references: Vec<&Sequence> = sequences.iter().collect();
+    let baseline = Baseline::fit(&layout, &normalisation, &references);
+    let contact = |index: usize| if index % 2 == 0 { Some(1) } else { None };
+    let held: Vec<Episode> =
+        sequences.iter().enumerate().map(|(i, sequence)| Episode { sequence, contact: contact(i) }).collect();
+    calibrate(&inference, &layout, &baseline, &held)
+}
+
+#[test]
+fn coverage_of_a_true_model_is_nominal_and_of_an_overconfident_one_is_not() {
+    // 4000 independent ranks: 5 standard errors of a share of 0.9 are 0.024, of 0.5 are 0.04.
+    let honest = report(2000, 1.0);
+    for parameter in &honest.parameters {
+        assert!((parameter.coverage90 - 0.9).abs() < 0.035, "{parameter:?}");
+        assert!((parameter.coverage50 - 0.5).abs() < 0.056, "{parameter:?}");
+    }
+    assert_eq!(honest.parameters[0].count, 4000);
+    assert!((1800..2200).contains(&honest.parameters[1].count), "counts only where it applies");
+    assert!(honest.parameters[1].ranks.iter().all(|&count| count > 50), "ranks given the class are flat");
+    // True spread 2σ: P(|z| < 1.645/2) = 0.589.
+    let overconfident = report(2000, 2.0);
+    assert!((overconfident.parameters[0].coverage90 - 0.589).abs() < 0.04, "{:?}", overconfident.parameters[0]);
+}
+
+#[test]
+fn likelihood_equals_the_entropy_of_the_truth() {
+    // ½ ln(2πe 9) + ½ · ½ ln(2πe) + ln 2, the last from the class.
+    let entropy = 0.5 * (2.0 * std::f64::consts::PI * std::f64::consts::E).ln();
+    let exact = entropy + 3.0_f64.ln() + 0.5 * entropy + 2.0_f64.ln();
+    let honest = report(4000, 1.0);
+    assert!((honest.nll - exact).abs() < 0.05, "{} {exact}", honest.nll);
+    // The truth is a product of marginals, so the baseline is as good.
+    assert!((honest.baseline_nll - exact).abs() < 0.05, "{} {exact}", honest.baseline_nll);
+    assert_eq!(honest.sharpening.len(), 2);
+    assert_eq!((honest.sharpening[0].after_contact.count, honest.sharpening[1].after_contact.count), (0, 2000));
+    assert_eq!(honest.sharpening[1].all.count, 4000);
+}
+
+#[test]
+fn confidence_of_one_half_is_calibrated_and_confusion_counts_everything() {
+    let honest = report(2000, 1.0);
+    let class = &honest.classes[0];
+    assert!(class.expected_calibration_error < 0.06, "{class:?}");
+    assert_eq!(class.confusion.iter().flatten().sum::<usize>(), 4000);
+    let right = (class.confusion[0][0] + class.confusion[1][1]) as f64 / 4000.0;
+    assert!((class.accuracy - right).abs() < 1e-12);
+    assert!(honest.obstacle_after_contact_accuracy.is_some_and(|accuracy| (accuracy - 0.5).abs() < 0.08));
+    assert!(honest.shape_accuracy.is_some());
+}

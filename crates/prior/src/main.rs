@@ -1,0 +1,247 @@
+//! `cargo xtask train`: trains the prior on a dataset, epoch by epoch, resumable.
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use anyhow::{Context as _, Result, anyhow};
+use clap::Parser;
+use dataset::Reader;
+use indicatif::{ProgressBar, ProgressStyle};
+use pomdp::Seed;
+use prior::{
+    Checkpoint, Episode, GradientPath, Layout, NetworkConfig, Sequence, TrainConfig, Trainer, calibrate, curve_csv, features,
+    is_held_out,
+};
+
+/// Trains the prior: LSTM with a mixture density head over (s, Θ).
+#[derive(Debug, Parser)]
+#[command(name = "train", version)]
+struct Arguments {
+    /// Arm: sawyer or jaco.
+    #[arg(long, default_value = "sawyer")]
+    robot: String,
+    /// Folder of the dataset [default: runs/data/ROBOT, runs/quick/data/ROBOT with --quick].
+    #[arg(long)]
+    data: Option<PathBuf>,
+    /// Folder of the trained prior [default: runs/priors/ROBOT, runs/quick/priors/ROBOT with --quick].
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Most epochs [default: 150, 10 with --quick].
+    #[arg(long)]
+    epochs: Option<usize>,
+    /// Stops after this many epochs without a better held-out likelihood.
+    #[arg(long, default_value_t = 15)]
+    patience: usize,
+    /// Probability that an output of an LSTM layer is dropped while training; the paper has none.
+    #[arg(long, default_value_t = 0.0)]
+    dropout: f64,
+    /// Root seed.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Worker threads [default: all cores]; the weights do not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// A few epochs on the quick dataset.
+    #[arg(long)]
+    quick: bool,
+    /// Insists on going on with an interrupted training. Without it one is gone on with if it is there.
+    #[arg(long)]
+    resume: bool,
+    /// Project folder [default: the current one].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => {
+            eprintln!("interrupted: finished epochs are kept, run the same command again to go on");
+            ExitCode::from(130)
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<bool> {
+    let root = match &arguments.root {
+        Some(root) => root.clone(),
+        None => project_root(&std::env::current_dir()?),
+    };
+    let runs = root.join(if arguments.quick { "runs/quick" } else { "runs" });
+    let data = arguments.data.clone().unwrap_or_else(|| runs.join("data").join(&arguments.robot));
+    let out = arguments.out.clone().unwrap_or_else(|| runs.join("priors").join(&arguments.robot));
+    rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
+
+    let reader = Reader::open(&data).with_context(|| format!("{}: no usable dataset, make one with datagen", data.display()))?;
+    let manifest = reader.manifest().clone();
+    if manifest.schema.robot != arguments.robot {
+        let found = &manifest.schema.robot;
+        return Err(anyhow!("{}: schema.robot is {found}, expected {}", data.join("meta/info.json").display(), arguments.robot));
+    }
+    let recorded = reader.episodes()?;
+    let sequences: Vec<Sequence> = recorded.iter().map(features::sequence).collect();
+    let layout = features::layout_of_dataset(&manifest.schema);
+    let config = TrainConfig {
+        network: NetworkConfig { hidden: vec![128, 128], components: 10 },
+        learning_rate: 0.001,
+        batch: 128,
+        chunks: 4,
+        held_out: 0.1,
+        max_epochs: arguments.epochs.unwrap_or(if arguments.quick { 10 } else { 150 }),
+        patience: arguments.patience,
+        clip_norm: Some(10.0),
+        weight_decay: 0.0,
+        dropout: arguments.dropout,
+        gradient: GradientPath::Fused,
+    };
+    let seed = Seed(arguments.seed);
+    let state = out.join("training");
+    let mut trainer = open_trainer(&state, arguments.resume, &layout, &config, &sequences, seed)?;
+    let provenance: BTreeMap<String, String> = [
+        ("dataset_plan_hash", manifest.plan_hash.clone()),
+        ("dataset_seed", manifest.seed.to_string()),
+        ("dataset_transitions", manifest.transitions.to_string()),
+        ("dataset_commit", manifest.commit.clone()),
+        ("program", format!("train {}", env!("CARGO_PKG_VERSION"))),
+    ]
+    .map(|(key, value)| (key.to_string(), value))
+    .into();
+    if !train(&mut trainer, &config, &state, &out, &provenance)? {
+        return Ok(false);
+    }
+    let checkpoint = trainer.checkpoint(provenance);
+    checkpoint.save(&out)?;
+    write(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes())?;
+    report(&checkpoint, &layout, &config, seed, &recorded, &sequences, &out)?;
+    Ok(true)
+}
+
+/// Goes on with the training in `state` where there is one of the same settings, else begins.
+fn open_trainer(
+    state: &Path,
+    insist: bool,
+    layout: &Layout,
+    config: &TrainConfig,
+    sequences: &[Sequence],
+    seed: Seed,
+) -> Result<Trainer> {
+    if !state.is_dir() {
+        if insist {
+            return Err(anyhow!("{}: --resume expected an interrupted training, found none", state.display()));
+        }
+        return Ok(Trainer::new(config.clone(), layout.clone(), sequences, seed)?);
+    }
+    let trainer = Trainer::resume(state, layout, sequences)?;
+    let facts = trainer.checkpoint(BTreeMap::new()).facts;
+    if facts.config != *config || facts.seed != seed.0 {
+        return Err(anyhow!(
+            "{}: holds a training with seed {} and {:?}, this one has seed {} and {config:?}: choose another --out or remove the folder",
+            state.display(),
+            facts.seed,
+            facts.config,
+            seed.0,
+        ));
+    }
+    eprintln!("{} epochs are finished already", trainer.curve().len());
+    Ok(trainer)
+}
+
+/// Epochs until the end; false where interrupted.
+fn train(
+    trainer: &mut Trainer,
+    config: &TrainConfig,
+    state: &Path,
+    out: &Path,
+    provenance: &BTreeMap<String, String>,
+) -> Result<bool> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
+    let bar = ProgressBar::new(config.max_epochs as u64);
+    let style = "{bar:40} {pos}/{len} epochs, {eta} left, {msg}";
+    bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
+    bar.set_position(trainer.curve().len() as u64);
+    while !trainer.finished() {
+        if interrupted.load(Ordering::Relaxed) {
+            return Ok(false);
+        }
+        #[expect(clippy::disallowed_methods, reason = "a program may time its epochs; nothing depends on it")]
+        let started = std::time::Instant::now();
+        let epoch = trainer.epoch()?;
+        trainer.save(state)?;
+        if epoch.best_epoch == epoch.epoch {
+            // A prior that can be used is there from the first epoch on.
+            trainer.checkpoint(provenance.clone()).save(out)?;
+        }
+        bar.inc(1);
+        let line = format!(
+            "epoch {}: training {:.3}, held out {:.3} nats, best {:.3} at {}, {:.1} s",
+            epoch.epoch,
+            epoch.training_nll,
+            epoch.held_out_nll,
+            epoch.best_held_out_nll,
+            epoch.best_epoch,
+            started.elapsed().as_secs_f64(),
+        );
+        if bar.is_hidden() {
+            eprintln!("{line}");
+        } else {
+            bar.set_message(line);
+        }
+    }
+    bar.finish_and_clear();
+    Ok(true)
+}
+
+/// Calibration on the held-out episodes: written beside the prior, its heads printed.
+fn report(
+    checkpoint: &Checkpoint,
+    layout: &Layout,
+    config: &TrainConfig,
+    seed: Seed,
+    recorded: &[dataset::Episode],
+    sequences: &[Sequence],
+    out: &Path,
+) -> Result<()> {
+    let held_out: Vec<Episode<'_>> = (0..sequences.len())
+        .filter(|&index| is_held_out(seed, index, config.held_out))
+        .map(|index| Episode { sequence: &sequences[index], contact: features::first_contact(&recorded[index]) })
+        .collect();
+    let calibration = calibrate(&checkpoint.inference()?, layout, &checkpoint.baseline, &held_out);
+    let json = serde_json::to_string_pretty(&calibration)? + "\n";
+    write(&out.join("calibration.json"), json.as_bytes())?;
+    println!(
+        "{}: best epoch {} of {}, held-out {:.3} nats a step on {} episodes, baseline {:.3}",
+        out.display(),
+        checkpoint.facts.best_epoch,
+        checkpoint.facts.curve.len(),
+        calibration.nll,
+        calibration.episodes,
+        calibration.baseline_nll,
+    );
+    Ok(())
+}
+
+/// The nearest folder at or above `start` with scenarios, else `start`: training needs no scenario, only a place for its default folders.
+fn project_root(start: &Path) -> PathBuf {
+    let found = start.ancestors().find(|folder| folder.join("scenarios/base.toml").is_file());
+    found.unwrap_or(start).to_path_buf()
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}: cannot write", folder.display()))?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path).with_context(|| format!("{}: cannot write", path.display()))?;
+    Ok(())
+}

@@ -1,0 +1,141 @@
+use super::*;
+use crate::fused::Workspace;
+use crate::parameters::tests::dimensions;
+use pomdp::{Purpose, Rng, Seed};
+use rand::RngExt as _;
+
+fn random_sequence(sizes: &Dimensions, steps: usize, rng: &mut Rng) -> Sequence {
+    let mut uniform = |count: usize| (0..count).map(|_| 4.0 * rng.random::<f32>() - 2.0).collect::<Vec<f32>>();
+    let observations = uniform(steps * sizes.observations);
+    let targets = uniform(steps * sizes.continuous);
+    let mask = uniform(steps * sizes.continuous).iter().map(|&v| if v > -1.0 { 1.0 } else { 0.0 }).collect();
+    let classes = (0..steps).flat_map(|_| sizes.classes.clone()).map(|labels| rng.random_range(0..labels) as u8);
+    Sequence { observations, targets, mask, classes: classes.collect(), steps }
+}
+
+fn problem(item: u64) -> (Dimensions, Parameters<f32>, Vec<Sequence>, Rng) {
+    let sizes = dimensions(5, 6, &[3, 4], &[7, 9], 3);
+    let mut rng = Seed(5).stream(Purpose::Test, item);
+    let mut parameters = Parameters::initial(&sizes, Seed(5));
+    for value in parameters.tensors.iter_mut().flatten() {
+        *value += 0.6 * rng.random::<f32>() - 0.3;
+    }
+    let sequences = [4, 1, 7, 7, 3].map(|steps| random_sequence(&sizes, steps, &mut rng));
+    (sizes, parameters, sequences.into(), rng)
+}
+
+fn random_dropout(sizes: &Dimensions, rows: usize, rng: &mut Rng) -> Dropout<f32> {
+    let mut factor = || if rng.random::<f32>() < 0.25 { 0.0 } else { 4.0 / 3.0 };
+    sizes.hidden.iter().map(|&width| (0..rows * width).map(|_| factor()).collect()).collect()
+}
+
+/// Loss and gradient by burn's autodiff.
+fn by_autodiff(
+    sizes: &Dimensions,
+    parameters: &Parameters<f32>,
+    sequences: &[&Sequence],
+    dropout: Option<&Dropout<f32>>,
+) -> (f64, Parameters<f32>) {
+    let device = device().autodiff();
+    let network = Network::new(parameters, sizes, &device);
+    let loss = network.loss(&Padded::new(sequences, sizes, &device), dropout, sizes);
+    let gradients = network.gradients(&loss.backward());
+    (loss.into_data().iter::<f64>().next().unwrap(), gradients)
+}
+
+#[test]
+fn fused_and_autodiff_agree_on_loss_and_gradient() {
+    for item in 0..3 {
+        let (sizes, parameters, sequences, mut rng) = problem(item);
+        let sequences: Vec<&Sequence> = sequences.iter().collect();
+        let batch = Batch::<f32>::pack(&sequences, &sizes);
+        let dropout = (item > 0).then(|| random_dropout(&sizes, batch.rows, &mut rng));
+        let (reference_loss, reference) = by_autodiff(&sizes, &parameters, &sequences, dropout.as_ref());
+        let mut space = Workspace::new(&sizes);
+        let scale = 1.0 / batch.rows as f32;
+        let loss = space.loss_and_gradient(&parameters, &batch, dropout.as_ref(), scale) / batch.rows as f64;
+        assert!((loss - reference_loss).abs() < 1e-5 * reference_loss.abs(), "{loss} {reference_loss}");
+        for ((fused, reference), spec) in space.gradient.tensors.iter().zip(&reference.tensors).zip(sizes.tensors()) {
+            let largest = reference.iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
+            assert!(largest > 1e-4, "{}: a gradient of zero compares nothing", spec.name);
+            for (fused, reference) in fused.iter().zip(reference) {
+                assert!((fused - reference).abs() <= 1e-5 * largest, "{}: {fused} {reference}", spec.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn gradient_is_that_of_finite_differences_in_f64() {
+    let (sizes, parameters, sequences, mut rng) = problem(9);
+    let sequences: Vec<&Sequence> = sequences.iter().collect();
+    let batch = Batch::<f64>::pack(&sequences, &sizes);
+    let dropout = random_dropout(&sizes, batch.rows, &mut rng);
+    let dropout = dropout.iter().map(|layer| layer.iter().map(|&v| f64::from(v)).collect()).collect();
+    let mut parameters = parameters.map(f64::from);
+    let mut space = Workspace::new(&sizes);
+    let _ = space.loss_and_gradient(&parameters, &batch, Some(&dropout), 1.0);
+    let gradient = space.gradient.clone();
+    let mut checked = 0;
+    for tensor in 0..parameters.tensors.len() {
+        for index in (0..parameters.tensors[tensor].len()).step_by(3) {
+            let (step, value) = (1e-5, parameters.tensors[tensor][index]);
+            let mut at = |offset: f64| {
+                parameters.tensors[tensor][index] = value + offset;
+                space.loss_and_gradient(&parameters, &batch, Some(&dropout), 1.0)
+            };
+            let slope = (8.0 * (at(step) - at(-step)) - (at(2.0 * step) - at(-2.0 * step))) / (12.0 * step);
+            parameters.tensors[tensor][index] = value;
+            let exact = gradient.tensors[tensor][index];
+            let name = &sizes.tensors()[tensor].name;
+            assert!((slope - exact).abs() < 1e-6 * (1.0 + exact.abs()), "{name}[{index}]: {slope} {exact}");
+            checked += 1;
+        }
+    }
+    assert!(checked > 500, "{checked}");
+}
+
+#[test]
+fn fused_outputs_equal_burns_forward_pass() {
+    let (sizes, parameters, sequences, _) = problem(3);
+    let sequences: Vec<&Sequence> = sequences.iter().collect();
+    let device = device();
+    let padded = Padded::new(&sequences, &sizes, &device);
+    let heads = Network::new(&parameters, &sizes, &device).forward(&padded, None);
+    let reference: Vec<f32> = Tensor::cat(heads, 1).into_data().try_into_vec().unwrap();
+    let batch = Batch::pack(&sequences, &sizes);
+    let mut space = Workspace::new(&sizes);
+    let width = sizes.outputs();
+    for (row, &position) in space.outputs(&parameters, &batch).chunks_exact(width).zip(padded.positions()) {
+        for (ours, theirs) in row.iter().zip(&reference[position * width..]) {
+            assert!((ours - theirs).abs() < 1e-5, "{ours} {theirs}");
+        }
+    }
+}
+
+#[test]
+fn what_the_mask_hides_changes_nothing() {
+    let (sizes, parameters, mut sequences, _) = problem(4);
+    let run = |sequences: &[Sequence]| {
+        let batch = Batch::<f32>::pack(&sequences.iter().collect::<Vec<_>>(), &sizes);
+        let mut space = Workspace::new(&sizes);
+        (space.loss_and_gradient(&parameters, &batch, None, 1.0), space.gradient)
+    };
+    let before = run(&sequences);
+    for sequence in &mut sequences {
+        for (target, &mask) in sequence.targets.iter_mut().zip(&sequence.mask) {
+            *target += 3.0 * (1.0 - mask);
+        }
+    }
+    assert_eq!(before, run(&sequences));
+    let (index, _) = sequences[0].mask.iter().enumerate().find(|(_, mask)| **mask == 1.0).unwrap();
+    sequences[0].targets[index] += 0.1;
+    assert_ne!(before.0, run(&sequences).0, "a target that applies does count");
+}
+
+#[test]
+fn network_returns_the_weights_it_was_made_of() {
+    let (sizes, parameters, _, _) = problem(6);
+    assert_eq!(Network::new(&parameters, &sizes, &device()).parameters(), parameters);
+    assert_eq!(Network::new(&parameters, &sizes, &device().autodiff()).parameters(), parameters);
+}

@@ -1,0 +1,92 @@
+//! A training run on disk, complete enough to go on as if it had never stopped.
+
+use super::{EpochReport, TrainConfig, Trainer};
+use crate::files::{self, FileRef};
+use crate::network::{Network, device};
+use crate::{Error, Layout, Sequence};
+use burn::tensor::Bytes;
+use pomdp::Seed;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Version of `training.json`.
+const VERSION: u64 = 1;
+
+/// File that makes a folder a training state.
+const FILE: &str = "training.json";
+
+/// `training.json`.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Manifest {
+    version: u64,
+    layout: Layout,
+    config: TrainConfig,
+    seed: Seed,
+    data_blake3: String,
+    steps: u64,
+    curve: Vec<EpochReport>,
+    current: FileRef,
+    best: FileRef,
+    optimizer: FileRef,
+}
+
+impl Trainer {
+    /// Writes present and best weights, optimiser state and curve; a program killed in between leaves the old state or the
+    /// new one.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if the disk refuses, [`Error::Optimizer`] if burn does.
+    pub fn save(&self, dir: &Path) -> Result<(), Error> {
+        let specs = self.dimensions.tensors();
+        let weights = |prefix, parameters| {
+            files::write_blob(dir, prefix, "safetensors", &files::to_safetensors(parameters, &specs))
+        };
+        let bytes = self.optimizer.into_bytes();
+        let bytes = bytes.map_err(|error| Error::Optimizer { path: dir.into(), reason: error.to_string() })?;
+        let manifest = Manifest {
+            version: VERSION,
+            layout: self.layout.clone(),
+            config: self.config.clone(),
+            seed: self.seed,
+            data_blake3: self.data_blake3.clone(),
+            steps: self.steps,
+            curve: self.curve.clone(),
+            current: weights("current", &self.parameters)?,
+            best: weights("best", &self.best)?,
+            optimizer: files::write_blob(dir, "optimizer", "bpk", &bytes)?,
+        };
+        let sets = [("current", &manifest.current), ("best", &manifest.best), ("optimizer", &manifest.optimizer)];
+        files::commit(dir, FILE, &manifest, &sets)
+    }
+
+    /// Goes on with the run saved in `dir`, on the same data: the weights become what they would have been without the stop.
+    ///
+    /// # Errors
+    ///
+    /// One sentence for each of: missing, truncated or changed file, unknown version, another robot or layout, other data.
+    pub fn resume(dir: &Path, expected: &Layout, data: &[Sequence]) -> Result<Self, Error> {
+        let path = dir.join(FILE);
+        let manifest: Manifest = files::read_json(&path, "training state", VERSION)?;
+        manifest.layout.check(expected, &path)?;
+        let mut trainer = Self::new(manifest.config, manifest.layout, data, manifest.seed)?;
+        if trainer.data_blake3 != manifest.data_blake3 {
+            return Err(Error::OtherData { path, found: manifest.data_blake3, expected: trainer.data_blake3 });
+        }
+        let specs = trainer.dimensions.tensors();
+        let weights = |file: &FileRef| {
+            files::from_safetensors(&files::read_blob(dir, file)?, &specs, &dir.join(&file.name))
+        };
+        trainer.parameters = weights(&manifest.current)?;
+        trainer.best = weights(&manifest.best)?;
+        trainer.network = Network::new(&trainer.parameters, &trainer.dimensions, &device().autodiff());
+        let bytes = Bytes::from_bytes_vec(files::read_blob(dir, &manifest.optimizer)?);
+        let path = dir.join(&manifest.optimizer.name);
+        let optimizer = trainer.config.optimizer().from_bytes(bytes);
+        trainer.optimizer = optimizer.map_err(|error| Error::Optimizer { path, reason: error.to_string() })?;
+        trainer.steps = manifest.steps;
+        trainer.curve = manifest.curve;
+        Ok(trainer)
+    }
+}

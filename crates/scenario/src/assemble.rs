@@ -1,0 +1,100 @@
+//! A resolved scenario to a ready problem: true world, model, first belief.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use physics_model::robot::Robot;
+use physics_model::{Observation, Particle, PushModel, WorldDistribution};
+use pomdp::Rng;
+
+use crate::schema::InitialObstacle;
+use crate::{Error, Scenario};
+
+/// Everything that a trial needs.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// The true world's simulator.
+    pub truth: PushModel,
+    /// The model that plans and filters.
+    pub model: PushModel,
+    /// Where worlds come from.
+    pub worlds: WorldDistribution,
+    /// Where first beliefs come from.
+    pub beliefs: WorldDistribution,
+    /// Joint positions at the start of every episode.
+    pub start_joints_rad: Vec<f64>,
+}
+
+impl Problem {
+    /// Loads the arm and puts the parts together.
+    ///
+    /// # Errors
+    ///
+    /// A missing or faulty URDF; a start that the arm cannot take.
+    pub fn assemble(scenario: &Scenario, root: &Path) -> Result<Self, Error> {
+        let robot = Arc::new(Robot::load(&scenario.robot, root)?);
+        let truth = PushModel::new(scenario.push_config(&scenario.effects.truth), Arc::clone(&robot));
+        let model = PushModel::new(scenario.push_config(&scenario.effects.model), robot);
+        let start = scenario.task.tool_start_m;
+        let start_joints_rad = truth.joints_for(&scenario.robot.home_rad, start).ok_or_else(|| Error::Task {
+            name: scenario.name.clone(),
+            problem: format!("task.tool_start_m: expected a point that the arm reaches, found {start:?}"),
+        })?;
+        let worlds = scenario.distribution.clone();
+        let mut beliefs = worlds.clone();
+        if scenario.initial_belief.obstacle == InitialObstacle::None {
+            beliefs.obstacle.shape = [0.0, 0.0, 0.0, 1.0];
+        }
+        Ok(Self { scenario: scenario.clone(), truth, model, worlds, beliefs, start_joints_rad })
+    }
+
+    /// Draws a true world.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Task`] where the distribution leaves no possible world.
+    pub fn sample_world(&self, rng: &mut Rng) -> Result<Particle, Error> {
+        self.worlds.sample_possible(&self.truth, &self.start_joints_rad, rng).ok_or_else(|| self.impossible())
+    }
+
+    /// Draws `count` particles of the first belief: Θ and obstacle from the distribution, the object where it was measured,
+    /// within the noise of the sensor, standing on the table.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Task`] where no possible world agrees with the measurement.
+    pub fn initial_particles(
+        &self,
+        count: usize,
+        observation: &Observation,
+        rng: &mut Rng,
+    ) -> Result<Vec<Particle>, Error> {
+        let (position, orientation) = observation.object_pose();
+        let noise = &self.scenario.sensor.noise;
+        let mut pinned = self.beliefs.clone();
+        let pin = |value: f64, stddev: f64| physics_model::sampling::TruncatedNormal {
+            mean: value,
+            stddev,
+            low: value - 4.0 * stddev,
+            high: value + 4.0 * stddev,
+        };
+        pinned.object.x_m = pin(position[0], noise.position_m);
+        pinned.object.y_m = pin(position[1], noise.position_m);
+        let [x, y, z, w] = orientation;
+        let yaw = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
+        pinned.object.yaw_rad = pin(yaw, noise.orientation_rad);
+        (0..count)
+            .map(|_| pinned.sample_possible(&self.model, &self.start_joints_rad, rng).ok_or_else(|| self.impossible()))
+            .collect()
+    }
+
+
+    fn impossible(&self) -> Error {
+        Error::Task {
+            name: self.scenario.name.clone(),
+            problem: "distribution: expected worlds without overlap, a thousand draws in a row had one".into(),
+        }
+    }
+}

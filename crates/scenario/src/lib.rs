@@ -1,0 +1,26 @@
+//! Scenario files: TOML layers to one resolved scenario, a resolved scenario to a ready problem.
+//!
+//! # Example
+//!
+//! ```no_run
+//! use scenario::{Problem, Selection};
+//! let scenario = Selection { domain: "D4".into(), ..Selection::new(".") }.load()?;
+//! let problem = Problem::assemble(&scenario, ".".as_ref())?;
+//! assert_eq!(problem.truth.joint_count(), 7);
+//! # Ok::<(), scenario::Error>(())
+//! ```
+
+mod assemble;
+mod error;
+mod load;
+mod provenance;
+mod schema;
+
+pub use assemble::Problem;
+pub use error::Error;
+pub use provenance::commit;
+pub use load::{Selection, find_root};
+pub use schema::{
+    AgentConfig, DataConfig, EffectsConfig, EvaluationConfig, InitialBeliefConfig, InitialObstacle, Published, Scenario,
+    VERSION,
+};

@@ -1,0 +1,105 @@
+//! The menu: one verb, one release program. It builds what it runs, and never links it.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use anyhow::{Context as _, Result};
+use clap::{Parser, Subcommand};
+
+/// Commands of the project. `cargo xtask VERB --help` lists the options of a verb.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", version)]
+struct Menu {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Generates training data.
+    #[command(disable_help_flag = true)]
+    Datagen(Rest),
+    /// Trains the prior.
+    #[command(disable_help_flag = true)]
+    Train(Rest),
+    /// Plays trials of methods on a domain and prints the table.
+    #[command(disable_help_flag = true)]
+    Eval(Rest),
+    /// Runs exactly what CI runs: formatting, lints, all tests.
+    Ci,
+}
+
+#[derive(Debug, clap::Args)]
+struct Rest {
+    /// Options of the program.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+    arguments: Vec<String>,
+}
+
+fn main() -> ExitCode {
+    let result = match Menu::parse().verb {
+        Verb::Datagen(rest) => program("datagen", "datagen", &rest.arguments),
+        Verb::Train(rest) => program("prior", "train", &rest.arguments),
+        Verb::Eval(rest) => program("experiments", "eval", &rest.arguments),
+        Verb::Ci => ci(),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::FAILURE
+    })
+}
+
+/// Builds a release program and runs it in its place, with its exit code.
+fn program(package: &str, binary: &str, arguments: &[String]) -> Result<ExitCode> {
+    let root = root();
+    let built = cargo(&root).args(["build", "--release", "--quiet", "--package", package, "--bin", binary]).status();
+    if !built.context("cannot run cargo")?.success() {
+        return Ok(ExitCode::FAILURE);
+    }
+    let path = target(&root).join("release").join(binary);
+    let mut command = Command::new(&path);
+    command.args(arguments);
+    // Becoming the program hands on its exit code, its terminal and every signal, an interrupt among them.
+    #[cfg(unix)]
+    {
+        use std::os::unix::process::CommandExt as _;
+        Err(command.exec()).with_context(|| format!("cannot run {}", path.display()))
+    }
+    #[cfg(not(unix))]
+    {
+        let status = command.status().with_context(|| format!("cannot run {}", path.display()))?;
+        Ok(ExitCode::from(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)))
+    }
+}
+
+fn ci() -> Result<ExitCode> {
+    let root = root();
+    let steps: [&[&str]; 3] = [
+        &["fmt", "--all", "--check"],
+        &["clippy", "--release", "--workspace", "--all-targets", "--", "--deny", "warnings"],
+        &["test", "--release", "--workspace"],
+    ];
+    for step in steps {
+        eprintln!("cargo {}", step.join(" "));
+        if !cargo(&root).args(step).status().context("cannot run cargo")?.success() {
+            return Ok(ExitCode::FAILURE);
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn cargo(root: &Path) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root);
+    command
+}
+
+/// The workspace that this program was built in.
+fn root() -> PathBuf {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.ancestors().nth(2).unwrap_or(package).to_path_buf()
+}
+
+fn target(root: &Path) -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
+}

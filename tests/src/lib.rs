@@ -1,0 +1,74 @@
+//! Helpers of the end-to-end suite: running the programs as a user does.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The checkout.
+#[must_use]
+pub fn root() -> PathBuf {
+    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+    package.parent().unwrap_or(package).to_path_buf()
+}
+
+/// A release program, built from this checkout if need be, set to run at its root.
+///
+/// # Panics
+///
+/// If it cannot be built.
+#[must_use]
+pub fn program(package: &str, binary: &str) -> Command {
+    let root = root();
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let built = Command::new(cargo)
+        .current_dir(&root)
+        .args(["build", "--release", "--quiet", "--package", package, "--bin", binary])
+        .status();
+    assert!(built.is_ok_and(|status| status.success()), "{binary} does not build");
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+    let mut command = Command::new(target.join("release").join(binary));
+    command.current_dir(&root);
+    command
+}
+
+/// Runs `binary` with `arguments`, split at spaces.
+///
+/// # Panics
+///
+/// If it cannot be started.
+#[must_use]
+pub fn run(package: &str, binary: &str, arguments: &str) -> Output {
+    program(package, binary)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap_or_else(|error| panic!("{binary} {arguments}: {error}"))
+}
+
+/// Standard error of a finished program.
+#[must_use]
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// All files below `folder` with their bytes, by relative path, in order.
+///
+/// # Panics
+///
+/// If the folder cannot be read.
+#[must_use]
+pub fn files(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_path_buf()];
+    while let Some(next) = open.pop() {
+        for entry in std::fs::read_dir(&next).unwrap_or_else(|e| panic!("{}: {e}", next.display())) {
+            let path = entry.expect("the folder is readable").path();
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let bytes = std::fs::read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+                found.push((path.strip_prefix(folder).unwrap_or(&path).to_path_buf(), bytes));
+            }
+        }
+    }
+    found.sort();
+    found
+}

@@ -1,0 +1,5 @@
+//! End-to-end suite.
+
+mod architecture;
+mod bad_input;
+mod pipeline;
