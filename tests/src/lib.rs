@@ -10,18 +10,18 @@ pub fn root() -> PathBuf {
     package.parent().unwrap_or(package).to_path_buf()
 }
 
-/// A release program, built from this checkout if need be, set to run at its root.
+/// A release program, built from this checkout if need be, set to run at its root. All programs are built together, as `xtask` does.
 ///
 /// # Panics
 ///
 /// If it cannot be built.
 #[must_use]
-pub fn program(package: &str, binary: &str) -> Command {
+pub fn program(binary: &str) -> Command {
     let root = root();
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let built = Command::new(cargo)
         .current_dir(&root)
-        .args(["build", "--release", "--quiet", "--package", package, "--bin", binary])
+        .args(["build", "--release", "--quiet", "--workspace", "--bins"])
         .status();
     assert!(built.is_ok_and(|status| status.success()), "{binary} does not build");
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
@@ -36,8 +36,8 @@ pub fn program(package: &str, binary: &str) -> Command {
 ///
 /// If it cannot be started.
 #[must_use]
-pub fn run(package: &str, binary: &str, arguments: &str) -> Output {
-    program(package, binary)
+pub fn run(binary: &str, arguments: &str) -> Output {
+    program(binary)
         .args(arguments.split_whitespace())
         .output()
         .unwrap_or_else(|error| panic!("{binary} {arguments}: {error}"))

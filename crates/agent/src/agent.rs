@@ -112,7 +112,8 @@ impl<'a> Agent<'a> {
                 Mind::Belief(mut search, particles) => {
                     let filter = RejectionFilter::new(self.problem.scenario.belief.clone())
                         .expect("a loaded scenario holds a valid belief configuration");
-                    match filter.update(model, particles, &record.action, &observation, &proposals, &mut streams.filter) {
+                    match filter.update(model, particles, &record.action, &observation, &proposals, &mut streams.filter)
+                    {
                         Ok((particles, report)) => {
                             depletions += usize::from(report.acceptance == 0.0);
                             record.transitions += report.transitions;
@@ -153,8 +154,7 @@ impl<'a> Agent<'a> {
             Method::NoRnn | Method::RnnMax | Method::RnnSampling => {
                 let mut rng = seed.stream(Purpose::InitialBelief, 0);
                 let particles = self.problem.initial_particles(scenario.belief.particles, observation, &mut rng)?;
-                let particles =
-                    Particles::uniform(particles).map_err(|error| Error::World(error.to_string()))?;
+                let particles = Particles::uniform(particles).map_err(|error| Error::World(error.to_string()))?;
                 Mind::Belief(search()?, particles)
             }
         })

@@ -74,8 +74,7 @@ impl Generator {
         for step in 1..=data.episode_actions {
             let explores = policy_rng.random::<f64>() < data.exploration_share;
             let random = Action::ALL[policy_rng.random_range(0..Action::ALL.len())];
-            let action =
-                if explores { random } else { HeuristicPolicy.action(model, &particle, &mut policy_rng) };
+            let action = if explores { random } else { HeuristicPolicy.action(model, &particle, &mut policy_rng) };
             let (result, report) = model.act(&mut particle, action, &mut noise_rng);
             if result.outcome == Outcome::Diverged {
                 episode.diverged = true;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, anyhow};
@@ -88,9 +88,10 @@ fn run(arguments: &Arguments) -> Result<bool> {
     if transitions == 0 {
         return Err(anyhow!("--transitions: expected at least 1, found 0"));
     }
-    let out = arguments.out.clone().unwrap_or_else(|| {
-        root.join(if arguments.quick { "runs/quick/data" } else { "runs/data" }).join(&robot)
-    });
+    let out = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| root.join(if arguments.quick { "runs/quick/data" } else { "runs/data" }).join(&robot));
     let plan = datagen::plan(&scenario, scenario::commit(&root), transitions, arguments.seed, arguments.shards);
     plan.open(&out)?;
     let hash = plan.hash();
@@ -162,7 +163,10 @@ fn missing_shards(plan: &dataset::Plan, out: &std::path::Path, hash: &str) -> Re
             ShardState::Missing => missing.push(index),
             ShardState::Broken(reason) => {
                 let file = out.join(dataset::shard_path(index));
-                return Err(anyhow!("{}: expected a whole shard, {reason}: remove the file to make it again", file.display()));
+                return Err(anyhow!(
+                    "{}: expected a whole shard, {reason}: remove the file to make it again",
+                    file.display()
+                ));
             }
         }
     }

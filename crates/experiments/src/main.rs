@@ -99,8 +99,9 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let problem = Problem::assemble(&scenario, &root)?;
     let prior = if methods.iter().any(|m| m.needs_prior()) {
         let folder = prior_folder(arguments, &scenario, &root);
+        let prior = Suggester::load(&folder, &scenario.robot.name, &problem.model)?;
         eprintln!("prior: {}", folder.display());
-        Some(Suggester::load(&folder, &scenario.robot.name, &problem.model)?)
+        Some(prior)
     } else {
         None
     };
@@ -165,7 +166,12 @@ fn play_missing(run: &Run, problem: &Problem, prior: Option<&Suggester>, argumen
                 bar.inc(1);
                 if bar.is_hidden() {
                     let end = format!("{:?}", record.reason).to_lowercase();
-                    eprintln!("{} trial {trial}: {end} after {} actions, {:.1} s", method.name(), record.steps, record.seconds);
+                    eprintln!(
+                        "{} trial {trial}: {end} after {} actions, {:.1} s",
+                        method.name(),
+                        record.steps,
+                        record.seconds
+                    );
                 }
                 Ok(())
             })

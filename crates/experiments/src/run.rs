@@ -119,7 +119,13 @@ impl Run {
     /// # Errors
     ///
     /// Where a file cannot be read or written.
-    pub fn finish(&self, domain: &str, robot: &str, preset: &str, published: &BTreeMap<String, scenario::Published>) -> Result<Table, Error> {
+    pub fn finish(
+        &self,
+        domain: &str,
+        robot: &str,
+        preset: &str,
+        published: &BTreeMap<String, scenario::Published>,
+    ) -> Result<Table, Error> {
         let log_file = self.folder.join("trials.jsonl");
         let trials = read_trials(&log_file)?;
         // In order of method and trial, whatever order they ended in.

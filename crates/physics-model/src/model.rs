@@ -16,7 +16,7 @@ use crate::robot::Robot;
 use crate::sensor::{Observation, ObservationKey, Readings};
 use crate::state::State;
 use crate::theta::Theta;
-use crate::world::{ToolPose, World, Wrench, check_overlaps, check_theta};
+use crate::world::{ToolPose, World, Wrench, check_overlaps, check_theta, nothing_happens};
 
 /// One hypothesis: state and parameters, with what of the past the rewards and the sensors need.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,17 +58,24 @@ pub struct PushModel {
     robot: Arc<Robot>,
     effects: Arc<Vec<Box<dyn Effect>>>,
     tool_orientation: UnitQuaternion<f64>,
+    /// No effect turns gravity: what rests goes on resting.
+    level: bool,
 }
 
 impl PushModel {
     /// A model of `robot` in the world, task and sensors of `config`.
     #[must_use]
     pub fn new(config: PushConfig, robot: Arc<Robot>) -> Self {
-        let effects = Arc::new(config.effects.iter().map(EffectConfig::build).collect());
+        let effects: Arc<Vec<Box<dyn Effect>>> = Arc::new(config.effects.iter().map(EffectConfig::build).collect());
+        let down = [0.0, 0.0, -config.world.gravity_mps2];
+        let mut gravity = down;
+        for effect in effects.iter() {
+            effect.gravity(&mut gravity);
+        }
         let r = robot.tool_rotation();
         let rotation = Matrix3::from_fn(|row, column| r[row][column]);
         let tool_orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-        Self { config, robot, effects, tool_orientation }
+        Self { config, robot, effects, tool_orientation, level: gravity == down }
     }
 
     /// Configuration.
@@ -125,11 +132,7 @@ impl PushModel {
     /// What noise-free sensors would say in the state that `particle` is in.
     #[must_use]
     pub fn readings(&self, particle: &Particle) -> Readings {
-        Readings {
-            joints_rad: particle.state.joints_rad.clone(),
-            force: particle.force,
-            object: particle.state.object,
-        }
+        Readings { joints_rad: particle.state.joints_rad.clone(), force: particle.force, object: particle.state.object }
     }
 
     /// The force readings that an observation holds (see [`Readings::force`]).
@@ -173,6 +176,10 @@ impl PushModel {
         let mut report = ActionReport::default();
         report.events.out_of_reach = goal_joints.is_none();
 
+        if self.is_quiet(particle, &tool, if goal_joints.is_some() { target } else { start }) {
+            let joints = goal_joints.unwrap_or_else(|| particle.state.joints_rad.clone());
+            return self.pass_quietly(particle, joints, report, rng);
+        }
         let mut world = World::restore(
             world_config,
             &self.effects,
@@ -227,6 +234,34 @@ impl PushModel {
         let observation = self.config.sensor.observe(&self.readings(particle), rng);
         let outcome = if report.events.goal { Outcome::Terminal } else { Outcome::Continue };
         (Step { observation, reward: task.reward.reward(report.events), outcome }, report)
+    }
+
+    fn is_quiet(&self, particle: &Particle, tool: &ToolPose, target_m: [f64; 3]) -> bool {
+        let state = &particle.state;
+        let (object, obstacle) = (&state.object, state.obstacle.as_ref());
+        let shapes = self.robot.tool_shapes();
+        self.level && nothing_happens(&self.config.world, &particle.theta, object, obstacle, tool, target_m, shapes)
+    }
+
+    /// An action in which only the arm moves.
+    fn pass_quietly(
+        &self,
+        particle: &mut Particle,
+        joints_rad: Vec<f64>,
+        mut report: ActionReport,
+        rng: &mut Rng,
+    ) -> (Step<Observation>, ActionReport) {
+        let state = &mut particle.state;
+        state.joints_rad = joints_rad;
+        for body in std::iter::once(&mut state.object).chain(&mut state.obstacle) {
+            body.linear_mps = [0.0; 3];
+            body.angular_rps = [0.0; 3];
+        }
+        particle.force = self.force_readings(&particle.state.joints_rad, &Wrench::default());
+        report.events.goal = self.config.task.goal.contains(particle.state.object.position_m);
+        let observation = self.config.sensor.observe(&self.readings(particle), rng);
+        let outcome = if report.events.goal { Outcome::Terminal } else { Outcome::Continue };
+        (Step { observation, reward: self.config.task.reward.reward(report.events), outcome }, report)
     }
 
     fn tool_pose(&self, joints_rad: &[f64]) -> ToolPose {

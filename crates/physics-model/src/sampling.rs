@@ -229,10 +229,7 @@ impl WorldDistribution {
         let (obstacle_theta, obstacle_state) = obstacle.unzip();
         Particle::new(
             State { joints_rad: joints_rad.to_vec(), object, obstacle: obstacle_state },
-            Theta {
-                object: ObjectTheta { shape, mass_kg, com_m, friction, size_m },
-                obstacle: obstacle_theta,
-            },
+            Theta { object: ObjectTheta { shape, mass_kg, com_m, friction, size_m }, obstacle: obstacle_theta },
         )
     }
 
@@ -300,7 +297,8 @@ mod tests {
         let d = TruncatedNormal { mean: 0.4, stddev: 0.2, low: 0.3, high: 1.0 };
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         let n = 20_000;
-        let mean = (0..n).map(|_| d.sample(&mut rng)).inspect(|v| assert!((0.3..=1.0).contains(v))).sum::<f64>() / f64::from(n);
+        let mean = (0..n).map(|_| d.sample(&mut rng)).inspect(|v| assert!((0.3..=1.0).contains(v))).sum::<f64>()
+            / f64::from(n);
         // μ + σ (φ(α) − φ(β)) / (Φ(β) − Φ(α)), α = −0.5, β = 3.
         let phi = |z: f64| (-z * z / 2.0).exp() / (2.0 * std::f64::consts::PI).sqrt();
         let standard = Normal::new(0.0, 1.0).unwrap();

@@ -98,11 +98,8 @@ impl SensorConfig {
             }
         }
         values.extend(readings.object.position_m.iter().map(|p| p + normal(noise.position_m)));
-        let turn = Vector3::new(
-            normal(noise.orientation_rad),
-            normal(noise.orientation_rad),
-            normal(noise.orientation_rad),
-        );
+        let turn =
+            Vector3::new(normal(noise.orientation_rad), normal(noise.orientation_rad), normal(noise.orientation_rad));
         let measured = UnitQuaternion::from_scaled_axis(turn) * unit(readings.object.orientation);
         // A rotation has two quaternions: the one with w ≥ 0 is reported.
         let sign = if measured.w < 0.0 { -1.0 } else { 1.0 };
@@ -165,23 +162,23 @@ impl SensorConfig {
         };
         match self.force {
             ForceSensing::Wrist => {
-                for j in 0..joints {
-                    add(values[j] - readings.joints_rad[j], noise.joint_rad);
+                for (value, q) in values.iter().zip(&readings.joints_rad) {
+                    add(value - q, noise.joint_rad);
                 }
-                for i in 0..6 {
-                    let stddev = if i < 3 { noise.force_n } else { noise.torque_nm };
-                    add(values[joints + i] - readings.force[i], stddev);
+                let stddevs = [[noise.force_n; 3], [noise.torque_nm; 3]].concat();
+                for ((value, force), stddev) in values[joints..].iter().zip(readings.force).zip(stddevs) {
+                    add(value - force, stddev);
                 }
             }
             ForceSensing::JointTorques => {
-                for j in 0..joints {
-                    add(values[j] - readings.force[j], noise.joint_torque_nm);
+                for (value, torque) in values.iter().zip(&readings.force[..joints]) {
+                    add(value - torque, noise.joint_torque_nm);
                 }
             }
         }
         let (position, orientation) = observation.object_pose();
-        for i in 0..3 {
-            add(position[i] - readings.object.position_m[i], noise.position_m);
+        for (value, p) in position.iter().zip(readings.object.position_m) {
+            add(value - p, noise.position_m);
         }
         let error = unit(orientation) * unit(readings.object.orientation).inverse();
         for component in error.scaled_axis().iter() {
@@ -280,8 +277,13 @@ mod tests {
         let mut rng = Seed(2).stream(Purpose::Test, 0);
         // E[ln p] of a Gaussian of dimension d with the 20 → 19 free values: −d/2 (1 + ln 2π) − Σ ln σ.
         let n = 2000;
-        let mean = (0..n).map(|_| sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &truth)).sum::<f64>() / f64::from(n);
-        let log_stddevs = 7.0 * 0.001_f64.ln() + 3.0 * 0.5_f64.ln() + 3.0 * 0.05_f64.ln() + 3.0 * 0.002_f64.ln() + 3.0 * 0.01_f64.ln();
+        let mean = (0..n).map(|_| sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &truth)).sum::<f64>()
+            / f64::from(n);
+        let log_stddevs = 7.0 * 0.001_f64.ln()
+            + 3.0 * 0.5_f64.ln()
+            + 3.0 * 0.05_f64.ln()
+            + 3.0 * 0.002_f64.ln()
+            + 3.0 * 0.01_f64.ln();
         let expected = -19.0 / 2.0 * (1.0 + (2.0 * std::f64::consts::PI).ln()) - log_stddevs;
         // Stddev of ln p is sqrt(d / 2) = 3.1: four standard errors.
         assert!((mean - expected).abs() < 4.0 * 3.1 / f64::from(n).sqrt(), "{mean} {expected}");

@@ -99,7 +99,12 @@ impl State {
     /// If `values` has not `joints + 26` entries.
     #[must_use]
     pub fn from_slice(values: &[f64], joints: usize, has_obstacle: bool) -> Self {
-        assert_eq!(values.len(), joints + 2 * BODY_LEN, "a state of {joints} joints has {} values", joints + 2 * BODY_LEN);
+        assert_eq!(
+            values.len(),
+            joints + 2 * BODY_LEN,
+            "a state of {joints} joints has {} values",
+            joints + 2 * BODY_LEN
+        );
         let body = |at: usize| {
             let mut row = [0.0; BODY_LEN];
             row.copy_from_slice(&values[at..at + BODY_LEN]);

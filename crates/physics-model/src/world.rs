@@ -25,6 +25,15 @@ const SPEED_LIMIT_MPS: f64 = 5.0;
 /// Height over the table, m, below which a body's centre has sunk into it.
 const SUNK_LIMIT_M: f64 = 0.004;
 
+/// Slower than this a body is at rest: friction stops it within a micrometre.
+const RESTING_SPEED_MPS: f64 = 0.002;
+const RESTING_SPIN_RPS: f64 = 0.02;
+/// Height over the resting height, m, and squared x–y part of the quaternion (2° of tilt) of a body that stands on the table.
+const RESTING_HEIGHT_M: f64 = 0.001;
+const RESTING_TILT_SQUARED: f64 = 3e-4;
+/// Distance, m, at which the tool passes clear of a body.
+const CLEARANCE_M: f32 = 0.002;
+
 /// Pose of the tool: position in m and unit quaternion x, y, z, w, base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ToolPose {
@@ -148,15 +157,7 @@ impl<'a> World<'a> {
                 physics.insert_collider(material(builder, config.tool_friction, config), Some(tool_body))
             })
             .collect();
-        Self {
-            config,
-            effects,
-            physics,
-            tool: tool_body,
-            tool_colliders,
-            object: object_body,
-            obstacle: obstacle_body,
-        }
+        Self { config, effects, physics, tool: tool_body, tool_colliders, object: object_body, obstacle: obstacle_body }
     }
 
     /// Advances one control step, at whose end the tool is at `position_m` (base frame); its orientation stays.
@@ -332,7 +333,10 @@ fn insert_body(
     let mut builder = if movable {
         let angular = vector(state.angular_rps);
         let arm = pose.transform_vector(vector(spec.com_m));
-        RigidBodyBuilder::dynamic().linvel(vector(state.linear_mps) + angular.cross(arm)).angvel(angular).can_sleep(false)
+        RigidBodyBuilder::dynamic()
+            .linvel(vector(state.linear_mps) + angular.cross(arm))
+            .angvel(angular)
+            .can_sleep(false)
     } else {
         RigidBodyBuilder::fixed()
     };
@@ -341,9 +345,8 @@ fn insert_body(
         spec.mass_kg as f32,
         vector(spec.inertia_kgm2()),
     ));
-    let collider = ColliderBuilder::new(shared_shape(spec.shape, spec.size_m))
-        .rotation(shape_axis_angle(spec.shape))
-        .density(0.0);
+    let collider =
+        ColliderBuilder::new(shared_shape(spec.shape, spec.size_m)).rotation(shape_axis_angle(spec.shape)).density(0.0);
     let (handle, collider) = physics.insert(builder, material(collider, spec.friction, config));
     Body {
         handle,
@@ -379,6 +382,61 @@ fn shape_axis_angle(shape: ObjectShape) -> Vector {
         ObjectShape::Cylinder => Vector::new(std::f32::consts::FRAC_PI_2, 0.0, 0.0),
         ObjectShape::Box | ObjectShape::Sphere => Vector::ZERO,
     }
+}
+
+/// Whether nothing can happen while the tool moves in a straight line from `tool` to `target_m`: every body stands upright at rest and the
+/// tool passes clear of all of them. Then a simulated world would return the state it was given, up to the settling of its
+/// contacts by some 0.1 mm, and need not be simulated. Only meant for vertical gravity: a tilt can set a resting body in motion.
+#[must_use]
+pub fn nothing_happens(
+    config: &WorldConfig,
+    theta: &Theta,
+    object: &BodyState,
+    obstacle: Option<&BodyState>,
+    tool: &ToolPose,
+    target_m: [f64; 3],
+    tool_shapes: &[ToolShape],
+) -> bool {
+    let rests = |shape: ObjectShape, size_m: [f64; 3], body: &BodyState| {
+        let speed = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let [x, y, _, _] = body.orientation;
+        let upright = shape == ObjectShape::Sphere || x * x + y * y < RESTING_TILT_SQUARED;
+        let height_m = body.position_m[2] - config.table_height_m - shape.half_height_m(size_m);
+        speed(body.linear_mps) < RESTING_SPEED_MPS
+            && speed(body.angular_rps) < RESTING_SPIN_RPS
+            && upright
+            && height_m.abs() < RESTING_HEIGHT_M
+    };
+    let clear = |shape: ObjectShape, size_m: [f64; 3], body: &BodyState| {
+        let at = pose(body.position_m, body.orientation) * Pose::rotation(shape_axis_angle(shape));
+        let bounds = shared_shape(shape, size_m).compute_aabb(&at);
+        tool_shapes.iter().all(|part| {
+            let [a, b, radius] = match part {
+                ToolShape::Ball { center_m, radius_m } => {
+                    [vector(*center_m), vector(*center_m), Vector::splat(*radius_m as f32)]
+                }
+                ToolShape::Capsule { a_m, b_m, radius_m } => {
+                    [vector(*a_m), vector(*b_m), Vector::splat(*radius_m as f32)]
+                }
+            };
+            let from = pose(tool.position_m, tool.orientation);
+            let to = pose(target_m, tool.orientation);
+            let ends = [from.transform_point(a), from.transform_point(b), to.transform_point(a), to.transform_point(b)];
+            let margin = radius + Vector::splat(CLEARANCE_M);
+            let low = ends.iter().fold(Vector::splat(f32::MAX), |m, p| m.min(*p)) - margin;
+            let high = ends.iter().fold(Vector::splat(f32::MIN), |m, p| m.max(*p)) + margin;
+            low.cmpgt(bounds.maxs).any() || high.cmplt(bounds.mins).any()
+        })
+    };
+    let quiet = |shape, size_m, body: &BodyState| rests(shape, size_m, body) && clear(shape, size_m, body);
+    let obstacle_quiet = match (&theta.obstacle, obstacle) {
+        (Some(o), Some(body)) => {
+            let moves = config.obstacle_mobility == ObstacleMobility::Movable;
+            (!moves || rests(o.shape, o.size_m, body)) && clear(o.shape, o.size_m, body)
+        }
+        _ => true,
+    };
+    obstacle_quiet && quiet(theta.object.shape, theta.object.size_m, object)
 }
 
 /// Checks the values of Θ against their physical range: finite, positive masses and sizes, friction in [0, 1], centre of mass

@@ -39,7 +39,13 @@ fn tool(position_m: [f64; 3]) -> ToolPose {
     ToolPose { position_m, orientation: [0.0, 0.0, 0.0, 1.0] }
 }
 
-fn restore<'a>(config: &'a WorldConfig, effects: &'a [Box<dyn Effect>], theta: &Theta, body: &BodyState, at: [f64; 3]) -> World<'a> {
+fn restore<'a>(
+    config: &'a WorldConfig,
+    effects: &'a [Box<dyn Effect>],
+    theta: &Theta,
+    body: &BodyState,
+    at: [f64; 3],
+) -> World<'a> {
     World::restore(config, effects, theta, body, None, &tool(at), &BALL)
 }
 
@@ -95,7 +101,11 @@ fn a_sliding_sphere_ends_rolling_at_five_sevenths_of_its_speed() {
     }
     let end = world.object();
     assert!((end.linear_mps[0] / 0.3 - 5.0 / 7.0).abs() < 0.03, "{:?}", end.linear_mps);
-    assert!((end.angular_rps[1] * 0.04 / end.linear_mps[0] - 1.0).abs() < 0.03, "rolls without slip: {:?}", end.angular_rps);
+    assert!(
+        (end.angular_rps[1] * 0.04 / end.linear_mps[0] - 1.0).abs() < 0.03,
+        "rolls without slip: {:?}",
+        end.angular_rps
+    );
 }
 
 #[test]
@@ -149,7 +159,8 @@ fn a_resting_scene_stays_at_rest() {
             let speed = world.object().linear_mps.iter().map(|v| v * v).sum::<f64>();
             assert!(speed / 2.0 < G * 0.001, "{shape:?} moves at {}", speed.sqrt());
         }
-        let drift = world.object().position_m.iter().zip(start.position_m).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let drift =
+            world.object().position_m.iter().zip(start.position_m).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(drift < 0.0015, "{shape:?} drifts by {drift} m in 5 s");
         assert!(!world.diverged());
     }
@@ -185,13 +196,21 @@ fn a_fixed_obstacle_blocks_the_push_and_a_movable_one_gives_way() {
         let obstacle = BodyState::at_rest([0.0, 0.15, 0.04], 0.0);
         let mut world = World::restore(&config, &[], &theta, &body, Some(&obstacle), &tool(start), &BALL);
         let (_, wrench) = push(&mut world, start, [0.0, 1.0, 0.0], 2);
-        (world.object().position_m[1], world.obstacle().unwrap().position_m[1], wrench.force_magnitude_n(), world.obstacle_touched())
+        (
+            world.object().position_m[1],
+            world.obstacle().unwrap().position_m[1],
+            wrench.force_magnitude_n(),
+            world.obstacle_touched(),
+        )
     };
     let (object_y, obstacle_y, force, touched) = run(ObstacleMobility::Fixed);
     assert!(touched && obstacle_y == f64::from(0.15_f32) && object_y < 0.09, "{object_y} {obstacle_y}");
     assert!(force > 100.0, "the blocked tool feels {force} N");
     let (object_y, obstacle_y, force, touched) = run(ObstacleMobility::Movable);
-    assert!(touched && (obstacle_y - 0.185).abs() < 0.004 && (object_y - 0.105).abs() < 0.004, "{object_y} {obstacle_y}");
+    assert!(
+        touched && (obstacle_y - 0.185).abs() < 0.004 && (object_y - 0.105).abs() < 0.004,
+        "{object_y} {obstacle_y}"
+    );
     let expected = 0.4 * 0.5 * G + 0.5 * 0.3 * G;
     assert!((force / expected - 1.0).abs() < 0.2, "pushes both: {force} N, expected {expected} N");
 }
@@ -206,7 +225,8 @@ fn a_world_is_a_function_of_its_state_whatever_ran_before() {
         (world.object(), wrench)
     };
     let first = run();
-    let mut other = restore(&config, &[], &object(ObjectShape::Box, [0.1; 3]), &BodyState::at_rest([0.0, 0.08, 0.05], 1.0), start);
+    let mut other =
+        restore(&config, &[], &object(ObjectShape::Box, [0.1; 3]), &BodyState::at_rest([0.0, 0.08, 0.05], 1.0), start);
     push(&mut other, start, [0.0, 1.0, 0.0], 5);
     assert_eq!(run(), first);
 }

@@ -71,7 +71,8 @@ fn deviations(name: &str) -> [f64; 5] {
     let mut worst = [0.0_f64; 5];
     for reference in &references {
         let pose = robot.base_from_tip(&reference.q);
-        let turn = (pose.rotation.to_rotation_matrix().matrix() - reference.orientation.to_rotation_matrix().matrix()).amax();
+        let turn =
+            (pose.rotation.to_rotation_matrix().matrix() - reference.orientation.to_rotation_matrix().matrix()).amax();
         let jacobian = robot.jacobian(&reference.q, robot.tip());
         let gravity = robot.gravity_torque(&reference.q);
         let mass = robot.mass_matrix(&reference.q);
@@ -230,7 +231,9 @@ fn every_point_is_solved(name: &str, points: usize) {
         largest_branch = largest_branch.max(largest_difference(&cold, &next));
         warm = next;
     }
-    println!("{name}: largest joint step per cm {largest_step:.3} rad, warm and cold differ by {largest_branch:.3} rad");
+    println!(
+        "{name}: largest joint step per cm {largest_step:.3} rad, warm and cold differ by {largest_branch:.3} rad"
+    );
     // The facts give 0.16 and 0.095 rad for neighbours; more would be a change of branch.
     assert!(largest_step < 0.25, "{largest_step}");
     assert!(largest_branch < 1.0, "{largest_branch}");

@@ -4,7 +4,9 @@
 
 use pomdp::{Purpose, Rng, Seed};
 use prior::fused::{Batch, Workspace};
-use prior::{ClassTarget, Dimensions, GradientPath, Inference, Layout, NetworkConfig, Parameters, Sequence, TrainConfig, Trainer};
+use prior::{
+    ClassTarget, Dimensions, GradientPath, Inference, Layout, NetworkConfig, Parameters, Sequence, TrainConfig, Trainer,
+};
 use rand::RngExt as _;
 use std::time::Instant;
 

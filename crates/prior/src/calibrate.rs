@@ -169,9 +169,10 @@ pub fn calibrate(inference: &Inference, layout: &Layout, baseline: &Baseline, ep
     let always: Vec<bool> = (0..width)
         .map(|column| episodes.iter().all(|e| e.sequence.mask.iter().skip(column).step_by(width).all(|&m| m == 1.0)))
         .collect();
-    let none = layout.classes.iter().enumerate().find_map(|(target, class)| {
-        class.labels.iter().position(|label| label == "none").map(|label| (target, label))
-    });
+    let none =
+        layout.classes.iter().enumerate().find_map(|(target, class)| {
+            class.labels.iter().position(|label| label == "none").map(|label| (target, label))
+        });
     let runs: Vec<Vec<Record>> =
         episodes.par_iter().map(|episode| run(inference, baseline, episode.sequence, &always, none)).collect();
     let score = |records: &mut dyn Iterator<Item = &Record>| {

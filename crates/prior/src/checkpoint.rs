@@ -151,8 +151,8 @@ impl Checkpoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::train::tests::small_problem;
     use crate::train::Trainer;
+    use crate::train::tests::small_problem;
     use pomdp::Seed;
     use std::fs;
 

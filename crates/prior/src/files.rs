@@ -53,8 +53,11 @@ pub(crate) fn read_blob(dir: &Path, file: &FileRef) -> Result<Vec<u8>, Error> {
 /// Renames the JSON file into place, then removes the binaries with these prefixes that it does not name.
 pub(crate) fn commit(dir: &Path, name: &str, value: &impl Serialize, sets: &[(&str, &FileRef)]) -> Result<(), Error> {
     let path = dir.join(name);
-    let mut text = serde_json::to_vec_pretty(value)
-        .map_err(|source| Error::Json { path: path.clone(), kind: "writable", source })?;
+    let mut text = serde_json::to_vec_pretty(value).map_err(|source| Error::Json {
+        path: path.clone(),
+        kind: "writable",
+        source,
+    })?;
     text.push(b'\n');
     write(dir, name, &text)?;
     let entries = std::fs::read_dir(dir).map_err(Error::io(dir, "list"))?;
@@ -99,7 +102,7 @@ pub(crate) fn to_safetensors(parameters: &Parameters<f32>, specs: &[TensorSpec])
         offset = end;
     }
     let mut header = Value::Object(header).to_string();
-    while header.len() % 8 != 0 {
+    while !header.len().is_multiple_of(8) {
         header.push(' ');
     }
     let mut bytes = (header.len() as u64).to_le_bytes().to_vec();

@@ -3,6 +3,9 @@
 //! burn's autodiff records about a hundred small operations a time step; this path needs two products a step and layer and
 //! nothing else that is not element by element. It works on plain vectors and is generic over f32 (training) and f64
 //! (finite differences). A test holds it to the gradients of [`crate::network`].
+//!
+//! The same seed gives the same bytes for any number of threads on one kind of CPU; `gemm` picks its kernels by the CPU's
+//! vector units (FMA, AVX-512), so another kind rounds differently.
 
 mod batch;
 mod head;
@@ -10,9 +13,10 @@ mod lstm;
 mod real;
 
 pub use batch::Batch;
-pub use head::LOG_STDDEV_LIMITS;
 pub(crate) use head::HALF_LOG_TAU;
+pub use head::LOG_STDDEV_LIMITS;
 pub use real::Real;
+pub(crate) use real::wide;
 
 use crate::parameters::{Dimensions, Parameters};
 use real::{Matrix, add_column_sums, product};
@@ -149,8 +153,11 @@ impl<T: Real> Workspace<T> {
             let gradients = [of_input.as_mut_slice(), of_recurrent, of_bias];
             let (lower, upper) = self.hidden_gradients.split_at_mut(layer);
             let upstream = &mut upper[0][..rows * sizes.hidden[layer]];
+            if let Some(factors) = factors(layer) {
+                upstream.iter_mut().zip(factors).for_each(|(gradient, &factor)| *gradient = *gradient * factor);
+            }
             let target = lower.last_mut().map(Vec::as_mut_slice);
-            current[0].backward(batch, inputs, weights, gradients, upstream, factors(layer), target);
+            current[0].backward(batch, inputs, weights, gradients, upstream, target);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One observation in, one mixture out: a stateful, allocation-free step on plain slices.
 
 use crate::checkpoint::Checkpoint;
-use crate::fused::{LOG_STDDEV_LIMITS, Real};
+use crate::fused::{LOG_STDDEV_LIMITS, Real, wide};
 use crate::mixture::Mixture;
 use crate::normalise::{Normalisation, normalise_observation};
 use crate::parameters::{Dimensions, Parameters};
@@ -51,7 +51,9 @@ impl Inference {
     pub fn new(dimensions: &Dimensions, normalisation: &Normalisation, parameters: &Parameters<f32>) -> Self {
         let (sizes, count) = (dimensions, dimensions.hidden.len());
         let layers = (0..count)
-            .map(|layer| ([parameters.input(layer), parameters.recurrent(layer)].concat(), parameters.bias(layer).to_vec()))
+            .map(|layer| {
+                ([parameters.input(layer), parameters.recurrent(layer)].concat(), parameters.bias(layer).to_vec())
+            })
             .collect();
         let heads = sizes.heads();
         let mut weight = Vec::with_capacity(sizes.top() * sizes.outputs());
@@ -160,9 +162,9 @@ impl Inference {
     }
 }
 
+wide! {
 /// `target += vector · matrix` for a row-major `[vector, target]` matrix.
-#[inline(always)]
-fn accumulate_body(target: &mut [f32], matrix: &[f32], vector: &[f32]) {
+fn accumulate(target: &mut [f32], matrix: &[f32], vector: &[f32]) {
     let width = target.len();
     let (blocks, scalars) = (matrix.chunks_exact(4 * width), vector.chunks_exact(4));
     for (&value, row) in scalars.remainder().iter().zip(blocks.remainder().chunks_exact(width)) {
@@ -180,11 +182,9 @@ fn accumulate_body(target: &mut [f32], matrix: &[f32], vector: &[f32]) {
         }
     }
 }
-
-fn accumulate(target: &mut [f32], matrix: &[f32], vector: &[f32]) {
-    accumulate_body(target, matrix, vector);
 }
 
+wide! {
 /// New cell and hidden state of one layer from the gate sums.
 fn activate(gates: &mut [f32], cell: &mut [f32], hidden: &mut [f32]) {
     let width = cell.len();
@@ -198,6 +198,7 @@ fn activate(gates: &mut [f32], cell: &mut [f32], hidden: &mut [f32]) {
         cell[index] = input[index] * candidate[index] + forget[index] * cell[index];
         hidden[index] = output[index] * Real::tanh(cell[index]);
     }
+}
 }
 
 /// Logits to ln probabilities.

@@ -175,10 +175,16 @@ pub(crate) mod tests {
             change(&mut bad);
             bad.check(&layout, 7).unwrap_err().to_string()
         };
-        assert_eq!(check(&|s| s.classes[1] = 3), "sequence 7, step 1: class_0 is class 3, expected an index into the labels");
+        assert_eq!(
+            check(&|s| s.classes[1] = 3),
+            "sequence 7, step 1: class_0 is class 3, expected an index into the labels"
+        );
         assert_eq!(check(&|s| s.mask[1] = 1.0), "sequence 7, step 0: target_1 is NaN, expected a finite number");
         assert_eq!(check(&|s| s.mask[3] = 0.5), "sequence 7, step 1: target_1 is masked by 0.5, expected 0 or 1");
-        assert_eq!(check(&|s| s.observations[1] = f32::INFINITY), "sequence 7, step 1: observation_0 is inf, expected a finite number");
+        assert_eq!(
+            check(&|s| s.observations[1] = f32::INFINITY),
+            "sequence 7, step 1: observation_0 is inf, expected a finite number"
+        );
         assert_eq!(check(&|s| s.steps = 3), "sequence 7: observations holds 2 values, expected 3");
         let empty = Sequence::default().check(&layout, 0).unwrap_err().to_string();
         assert_eq!(empty, "sequence 0: steps holds 0 values, expected 1");

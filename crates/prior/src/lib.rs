@@ -6,12 +6,55 @@
 //!
 //! One set of weights, three ways to run it, held to each other by tests: [`network`] in burn with autodiff, the reference;
 //! [`fused`] by hand on packed batches, for training; [`inference`] on plain slices, one step at a time.
+//!
+//! # Example
+//!
+//! ```
+//! use pomdp::{Purpose, Seed};
+//! use prior::{GradientPath, Layout, NetworkConfig, Sequence, TrainConfig, Trainer};
+//!
+//! let layout = Layout {
+//!     robot: "sawyer".into(),
+//!     observation: vec!["force".into()],
+//!     continuous: vec!["mass".into()],
+//!     classes: vec![],
+//! };
+//! // Twenty episodes of one step, in which the mass is twice the force.
+//! let episode = |i: usize| {
+//!     let (observations, targets) = (vec![i as f32], vec![2.0 * i as f32]);
+//!     Sequence { observations, targets, mask: vec![1.0], classes: vec![], steps: 1 }
+//! };
+//! let data: Vec<Sequence> = (0..20).map(episode).collect();
+//! let config = TrainConfig {
+//!     network: NetworkConfig { hidden: vec![8], components: 2 },
+//!     learning_rate: 0.01,
+//!     batch: 8,
+//!     chunks: 2,
+//!     held_out: 0.2,
+//!     max_epochs: 20,
+//!     patience: 5,
+//!     clip_norm: None,
+//!     weight_decay: 0.0,
+//!     dropout: 0.0,
+//!     gradient: GradientPath::Fused,
+//! };
+//! let mut trainer = Trainer::new(config, layout, &data, Seed(1))?;
+//! while !trainer.finished() {
+//!     let report = trainer.epoch()?;
+//!     assert!(report.held_out_nll.is_finite());
+//! }
+//! let mut inference = trainer.checkpoint(Default::default()).inference()?;
+//! let mixture = inference.step(&[10.0]);
+//! let draw = mixture.sample(&mut Seed(1).stream(Purpose::Suggestion, 0));
+//! assert!(mixture.log_density_masked(&draw.values, &[true], &draw.classes).is_finite());
+//! # Ok::<(), prior::Error>(())
+//! ```
 
 pub mod calibrate;
 pub mod checkpoint;
 pub mod error;
-mod files;
 pub mod features;
+mod files;
 pub mod fused;
 pub mod inference;
 pub mod layout;

@@ -13,8 +13,8 @@ use dataset::Reader;
 use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
 use prior::{
-    Checkpoint, Episode, GradientPath, Layout, NetworkConfig, Sequence, TrainConfig, Trainer, calibrate, curve_csv, features,
-    is_held_out,
+    Checkpoint, Episode, GradientPath, Layout, NetworkConfig, Sequence, TrainConfig, Trainer, calibrate, curve_csv,
+    features, is_held_out,
 };
 
 /// Trains the prior: LSTM with a mixture density head over (s, Θ).
@@ -81,11 +81,16 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let out = arguments.out.clone().unwrap_or_else(|| runs.join("priors").join(&arguments.robot));
     rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
 
-    let reader = Reader::open(&data).with_context(|| format!("{}: no usable dataset, make one with datagen", data.display()))?;
+    let reader =
+        Reader::open(&data).with_context(|| format!("{}: no usable dataset, make one with datagen", data.display()))?;
     let manifest = reader.manifest().clone();
     if manifest.schema.robot != arguments.robot {
         let found = &manifest.schema.robot;
-        return Err(anyhow!("{}: schema.robot is {found}, expected {}", data.join("meta/info.json").display(), arguments.robot));
+        return Err(anyhow!(
+            "{}: schema.robot is {found}, expected {}",
+            data.join("meta/info.json").display(),
+            arguments.robot
+        ));
     }
     let recorded = reader.episodes()?;
     let sequences: Vec<Sequence> = recorded.iter().map(features::sequence).collect();
@@ -239,7 +244,8 @@ fn project_root(start: &Path) -> PathBuf {
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}: cannot write", folder.display()))?;
+    let mut file =
+        tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}: cannot write", folder.display()))?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path).with_context(|| format!("{}: cannot write", path.display()))?;

@@ -53,7 +53,11 @@ impl Mixture {
         let components = weights.len();
         let labels: usize = sizes.iter().sum();
         assert_eq!(means.len() % components, 0, "{} means for {components} components", means.len());
-        assert_eq!((means.len(), components * labels), (stddevs.len(), classes.len()), "lengths of the mixture's parts");
+        assert_eq!(
+            (means.len(), components * labels),
+            (stddevs.len(), classes.len()),
+            "lengths of the mixture's parts"
+        );
         assert!(weights.iter().chain(&stddevs).all(|&value| value > 0.0), "weights {weights:?}, stddevs {stddevs:?}");
         let total: f64 = weights.iter().sum();
         let weights: Vec<f64> = weights.iter().map(|weight| weight / total).collect();
@@ -238,8 +242,16 @@ pub fn normal_cumulative(standard: f64) -> f64 {
     let x = standard.abs() / std::f64::consts::SQRT_2;
     let t = 1.0 / (1.0 + 0.5 * x);
     let series = [
-        -1.265_512_23, 1.000_023_68, 0.374_091_96, 0.096_784_18, -0.186_288_06, 0.278_868_07, -1.135_203_98, 1.488_515_87,
-        -0.822_152_23, 0.170_872_77,
+        -1.265_512_23,
+        1.000_023_68,
+        0.374_091_96,
+        0.096_784_18,
+        -0.186_288_06,
+        0.278_868_07,
+        -1.135_203_98,
+        1.488_515_87,
+        -0.822_152_23,
+        0.170_872_77,
     ];
     let exponent = series.iter().rev().fold(0.0, |sum, coefficient| sum * t + coefficient);
     let tail = 0.5 * t * (exponent - x * x).exp();
@@ -294,7 +306,8 @@ mod tests {
         let mixture = mixture();
         let (mut rng, count) = (Seed(3).stream(Purpose::Test, 0), 40_000);
         let draws: Vec<Draw> = (0..count).map(|_| mixture.sample(&mut rng)).collect();
-        let share = |test: &dyn Fn(&Draw) -> bool| draws.iter().filter(|draw| test(draw)).count() as f64 / f64::from(count);
+        let share =
+            |test: &dyn Fn(&Draw) -> bool| draws.iter().filter(|draw| test(draw)).count() as f64 / f64::from(count);
         // Tolerance: 5 standard errors of a share.
         let tolerance = 5.0 * 0.5 / f64::from(count).sqrt();
         assert!((share(&|d| d.component == 1) - 0.75).abs() < tolerance);
@@ -316,7 +329,9 @@ mod tests {
 
     #[test]
     fn normal_cumulative_has_tabulated_values() {
-        for (z, exact) in [(0.0, 0.5), (1.0, 0.841_344_746_068_543), (-1.959_963_984_540_054, 0.025), (6.0, 1.0 - 9.866e-10)] {
+        for (z, exact) in
+            [(0.0, 0.5), (1.0, 0.841_344_746_068_543), (-1.959_963_984_540_054, 0.025), (6.0, 1.0 - 9.866e-10)]
+        {
             assert!((normal_cumulative(z) - exact).abs() < 1.2e-7, "{z}");
         }
     }

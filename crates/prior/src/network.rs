@@ -141,12 +141,10 @@ impl Network {
         let data = |at: usize| TensorData::new(parameters.tensors[at].clone(), specs[at].shape.clone());
         let id = |at: usize| ParamId::from(at as u64 + 1);
         let tracked = device.is_autodiff();
-        let matrix = |at: usize| {
-            Param::initialized(id(at), Tensor::<2>::from_data(data(at), device).set_require_grad(tracked))
-        };
-        let vector = |at: usize| {
-            Param::initialized(id(at), Tensor::<1>::from_data(data(at), device).set_require_grad(tracked))
-        };
+        let matrix =
+            |at: usize| Param::initialized(id(at), Tensor::<2>::from_data(data(at), device).set_require_grad(tracked));
+        let vector =
+            |at: usize| Param::initialized(id(at), Tensor::<1>::from_data(data(at), device).set_require_grad(tracked));
         let layers = dimensions.hidden.len();
         let heads = 3 * layers..specs.len();
         Self {
@@ -222,6 +220,10 @@ impl Network {
     /// # Shapes
     ///
     /// `[1]`.
+    ///
+    /// # Panics
+    ///
+    /// If `dimensions` are not those that the network was made with.
     #[must_use]
     pub fn loss(&self, batch: &Padded, dropout: Option<&Dropout<f32>>, dimensions: &Dimensions) -> Tensor<1> {
         let (k, d) = (dimensions.components, dimensions.continuous);

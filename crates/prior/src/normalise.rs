@@ -58,7 +58,10 @@ impl Normalisation {
         let (inputs, outputs) = (layout.observation.len(), layout.continuous.len());
         let observation = (0..inputs).map(|column| {
             Scale::fit(
-                sequences.iter().flat_map(|s| s.observations.iter().skip(column).step_by(inputs)).map(|&v| f64::from(v)),
+                sequences
+                    .iter()
+                    .flat_map(|s| s.observations.iter().skip(column).step_by(inputs))
+                    .map(|&v| f64::from(v)),
             )
         });
         let continuous = (0..outputs).map(|column| {
@@ -124,7 +127,9 @@ mod tests {
         };
         let fitted = Normalisation::fit(&layout, &[&sequence]);
         let spread = (8.0_f64 / 3.0).sqrt();
-        assert!((fitted.observation[0].mean - 3.0).abs() < 1e-12 && (fitted.observation[0].stddev - spread).abs() < 1e-12);
+        assert!(
+            (fitted.observation[0].mean - 3.0).abs() < 1e-12 && (fitted.observation[0].stddev - spread).abs() < 1e-12
+        );
         assert_eq!(fitted.continuous[1], Scale { mean: 9.0, stddev: 1.0 }, "a constant column keeps its unit");
         let normalised = fitted.apply(&sequence);
         assert!((f64::from(normalised.targets[4]) - 2.0 / spread).abs() < 1e-6);

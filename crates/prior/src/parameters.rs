@@ -63,7 +63,11 @@ impl Dimensions {
         let dimensions = Self::unchecked(config, layout);
         let refuse = |setting, found: String, expected| Err(Error::Config { setting, found, expected });
         if config.hidden.is_empty() || config.hidden.contains(&0) {
-            return refuse("network.hidden", format!("{:?}", config.hidden), "at least one layer, each at least 1 wide");
+            return refuse(
+                "network.hidden",
+                format!("{:?}", config.hidden),
+                "at least one layer, each at least 1 wide",
+            );
         }
         if config.components == 0 {
             return refuse("network.components", "0".into(), "at least 1");
@@ -219,7 +223,13 @@ pub(crate) mod tests {
     use super::*;
 
     /// Sizes for tests.
-    pub(crate) fn dimensions(observations: usize, continuous: usize, classes: &[usize], hidden: &[usize], k: usize) -> Dimensions {
+    pub(crate) fn dimensions(
+        observations: usize,
+        continuous: usize,
+        classes: &[usize],
+        hidden: &[usize],
+        k: usize,
+    ) -> Dimensions {
         let classes = classes.to_vec();
         Dimensions { observations, continuous, classes, hidden: hidden.to_vec(), components: k }
     }
@@ -248,6 +258,9 @@ pub(crate) mod tests {
         let layout = crate::layout::tests::layout(2, 0, &[]);
         let config = NetworkConfig { hidden: vec![4], components: 2 };
         let message = Dimensions::new(&config, &layout).unwrap_err().to_string();
-        assert_eq!(message, "layout is 2 observations and 0 targets, expected at least one observation and one continuous target");
+        assert_eq!(
+            message,
+            "layout is 2 observations and 0 targets, expected at least one observation and one continuous target"
+        );
     }
 }

@@ -275,7 +275,12 @@ impl TrainConfig {
             ("chunks", self.chunks as f64, (1..=64).contains(&self.chunks), "1 to 64"),
             ("held_out", self.held_out, self.held_out > 0.0 && self.held_out < 1.0, "in (0, 1)"),
             ("patience", self.patience as f64, self.patience > 0, "at least 1"),
-            ("clip_norm", self.clip_norm.unwrap_or(1.0), self.clip_norm.is_none_or(|norm| norm > 0.0), "above 0, or none"),
+            (
+                "clip_norm",
+                self.clip_norm.unwrap_or(1.0),
+                self.clip_norm.is_none_or(|norm| norm > 0.0),
+                "above 0, or none",
+            ),
             ("weight_decay", self.weight_decay, self.weight_decay >= 0.0 && self.weight_decay.is_finite(), "0 or more"),
             ("dropout", self.dropout, (0.0..1.0).contains(&self.dropout), "in [0, 1)"),
         ];

@@ -90,7 +90,6 @@ impl Problem {
             .collect()
     }
 
-
     fn impossible(&self) -> Error {
         Error::Task {
             name: self.scenario.name.clone(),

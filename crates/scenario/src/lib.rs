@@ -18,9 +18,9 @@ mod schema;
 
 pub use assemble::Problem;
 pub use error::Error;
-pub use provenance::commit;
 pub use load::{Selection, find_root};
+pub use provenance::commit;
 pub use schema::{
-    AgentConfig, DataConfig, EffectsConfig, EvaluationConfig, InitialBeliefConfig, InitialObstacle, Published, Scenario,
-    VERSION,
+    AgentConfig, DataConfig, EffectsConfig, EvaluationConfig, InitialBeliefConfig, InitialObstacle, Published,
+    Scenario, VERSION,
 };

@@ -267,7 +267,10 @@ mod tests {
     #[test]
     fn unknown_names_list_what_exists() {
         let message = load(|s| s.domain = "D9".into()).unwrap_err().to_string();
-        assert!(message.contains("unknown domain `D9`") && message.contains("d1, d2, d3, d4, d5, obstacle, training"), "{message}");
+        assert!(
+            message.contains("unknown domain `D9`") && message.contains("d1, d2, d3, d4, d5, obstacle, training"),
+            "{message}"
+        );
         let message = load(|s| s.robot = "panda".into()).unwrap_err().to_string();
         assert!(message.contains("jaco, sawyer"), "{message}");
     }

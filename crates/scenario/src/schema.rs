@@ -183,16 +183,33 @@ impl Scenario {
             ("perturb.friction", p.friction),
             ("perturb.size_m", p.size_m),
         ];
-        let rewards = [t.reward.step, t.reward.large_force, t.reward.out_of_reach, t.reward.object_moved, t.reward.goal];
+        let rewards =
+            [t.reward.step, t.reward.large_force, t.reward.out_of_reach, t.reward.object_moved, t.reward.goal];
         let period = w.control_period_secs;
         check(positive(period) && period <= 0.1, "world.control_period_secs", "above 0 and at most 0.1 s", &period)
-            .or_else(|| check((1..=10_000).contains(&w.control_steps), "world.control_steps", "1 to 10000", &w.control_steps))
+            .or_else(|| {
+                check((1..=10_000).contains(&w.control_steps), "world.control_steps", "1 to 10000", &w.control_steps)
+            })
             .or_else(|| {
                 let n = w.solver_iterations;
                 check((1..=1000).contains(&n), "world.solver_iterations", "1 to 1000", &n)
             })
-            .or_else(|| check(positive(w.contact_frequency_hz), "world.contact_frequency_hz", "above 0 Hz", &w.contact_frequency_hz))
-            .or_else(|| check(positive(w.contact_damping_ratio), "world.contact_damping_ratio", "above 0", &w.contact_damping_ratio))
+            .or_else(|| {
+                check(
+                    positive(w.contact_frequency_hz),
+                    "world.contact_frequency_hz",
+                    "above 0 Hz",
+                    &w.contact_frequency_hz,
+                )
+            })
+            .or_else(|| {
+                check(
+                    positive(w.contact_damping_ratio),
+                    "world.contact_damping_ratio",
+                    "above 0",
+                    &w.contact_damping_ratio,
+                )
+            })
             .or_else(|| check(w.table_height_m.abs() < 10.0, "world.table_height_m", "within 10 m", &w.table_height_m))
             .or_else(|| check(positive(w.gravity_mps2), "world.gravity_mps2", "above 0 m/s²", &w.gravity_mps2))
             .or_else(|| check(share(w.tool_friction), "world.tool_friction", "0 to 1", &w.tool_friction))
@@ -200,9 +217,18 @@ impl Scenario {
             .or_else(|| check(share(w.restitution), "world.restitution", "0 to 1", &w.restitution))
             .or_else(|| check((1..=10_000).contains(&t.horizon), "task.horizon", "1 to 10000 actions", &t.horizon))
             .or_else(|| check(share(t.discount), "task.discount", "0 to 1", &t.discount))
-            .or_else(|| check(positive(t.step_m) && t.step_m <= 0.2, "task.step_m", "above 0 and at most 0.2 m", &t.step_m))
+            .or_else(|| {
+                check(positive(t.step_m) && t.step_m <= 0.2, "task.step_m", "above 0 and at most 0.2 m", &t.step_m)
+            })
             .or_else(|| reach.iter().find_map(|(key, [a, b])| check(a < b, key, "[low, high] in m", &[a, b])))
-            .or_else(|| check(t.reach.contains(t.tool_start_m), "task.tool_start_m", "a point inside task.reach", &t.tool_start_m))
+            .or_else(|| {
+                check(
+                    t.reach.contains(t.tool_start_m),
+                    "task.tool_start_m",
+                    "a point inside task.reach",
+                    &t.tool_start_m,
+                )
+            })
             .or_else(|| {
                 let goal = [t.goal.x_m, t.goal.y_m];
                 check(goal.iter().all(|v| v.is_finite()), "task.goal", "finite x_m and y_m", &goal)
@@ -213,15 +239,26 @@ impl Scenario {
                 let v = t.reward.moved_threshold_m;
                 check(positive(v), "task.reward.moved_threshold_m", "above 0 m", &v)
             })
-            .or_else(|| check(positive(s.large_force_limit), "sensor.large_force_limit", "above 0", &s.large_force_limit))
+            .or_else(|| {
+                check(positive(s.large_force_limit), "sensor.large_force_limit", "above 0", &s.large_force_limit)
+            })
             .or_else(|| stddevs.iter().find_map(|(key, v)| check(positive(*v), key, "a standard deviation above 0", v)))
             .or_else(|| {
-                perturb.iter().find_map(|(key, v)| check(v.is_finite() && *v >= 0.0, key, "a standard deviation, at least 0", v))
+                perturb
+                    .iter()
+                    .find_map(|(key, v)| check(v.is_finite() && *v >= 0.0, key, "a standard deviation, at least 0", v))
             })
             .or_else(|| self.distribution.problem().map(|p| format!("distribution.{p}")))
             .or_else(|| check(share(d.movable_share), "data.movable_share", "0 to 1", &d.movable_share))
             .or_else(|| check(share(d.exploration_share), "data.exploration_share", "0 to 1", &d.exploration_share))
-            .or_else(|| check((1..=10_000).contains(&d.episode_actions), "data.episode_actions", "1 to 10000", &d.episode_actions))
+            .or_else(|| {
+                check(
+                    (1..=10_000).contains(&d.episode_actions),
+                    "data.episode_actions",
+                    "1 to 10000",
+                    &d.episode_actions,
+                )
+            })
             .or_else(|| {
                 let n = self.evaluation.trials;
                 check((1..=1_000_000).contains(&n), "evaluation.trials", "1 to 1000000", &n)

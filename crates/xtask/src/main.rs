@@ -38,9 +38,9 @@ struct Rest {
 
 fn main() -> ExitCode {
     let result = match Menu::parse().verb {
-        Verb::Datagen(rest) => program("datagen", "datagen", &rest.arguments),
-        Verb::Train(rest) => program("prior", "train", &rest.arguments),
-        Verb::Eval(rest) => program("experiments", "eval", &rest.arguments),
+        Verb::Datagen(rest) => program("datagen", &rest.arguments),
+        Verb::Train(rest) => program("train", &rest.arguments),
+        Verb::Eval(rest) => program("eval", &rest.arguments),
         Verb::Ci => ci(),
     };
     result.unwrap_or_else(|error| {
@@ -49,10 +49,11 @@ fn main() -> ExitCode {
     })
 }
 
-/// Builds a release program and runs it in its place, with its exit code.
-fn program(package: &str, binary: &str, arguments: &[String]) -> Result<ExitCode> {
+/// Builds the release programs and becomes one of them. All are built together: built one by one, cargo would choose other features for
+/// the shared dependencies and compile them again.
+fn program(binary: &str, arguments: &[String]) -> Result<ExitCode> {
     let root = root();
-    let built = cargo(&root).args(["build", "--release", "--quiet", "--package", package, "--bin", binary]).status();
+    let built = cargo(&root).args(["build", "--release", "--quiet", "--workspace", "--bins"]).status();
     if !built.context("cannot run cargo")?.success() {
         return Ok(ExitCode::FAILURE);
     }

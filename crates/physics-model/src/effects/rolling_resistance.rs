@@ -38,13 +38,7 @@ mod tests {
     use super::*;
 
     fn torque(angular_rps: [f64; 3], on_table: bool) -> [f64; 3] {
-        let body = BodyView {
-            mass_kg: 0.5,
-            rolling_radius_m: Some(0.04),
-            on_table,
-            linear_mps: [0.0; 3],
-            angular_rps,
-        };
+        let body = BodyView { mass_kg: 0.5, rolling_radius_m: Some(0.04), on_table, linear_mps: [0.0; 3], angular_rps };
         let mut load = Load::default();
         let surroundings = Surroundings { gravity_mps2: 10.0, period_secs: 1.0 / 60.0 };
         RollingResistance { lever_m: 0.002 }.load(&surroundings, &body, &mut load);

@@ -41,10 +41,7 @@ impl Frame {
 
     /// outer ← inner, then inner ← innermost.
     pub(super) fn then(&self, inner: &Self) -> Self {
-        Self {
-            rotation: self.rotation * inner.rotation,
-            position: self.position + self.rotation * inner.position,
-        }
+        Self { rotation: self.rotation * inner.rotation, position: self.position + self.rotation * inner.position }
     }
 
     pub(super) fn inverse(&self) -> Self {

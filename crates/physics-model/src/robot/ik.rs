@@ -6,8 +6,9 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::chain::{Chain, Frame, JointVector};
+use super::chain::{Chain, Frame, Jacobian, JointVector};
 use super::{IkError, JointLimit};
+use crate::state::MAX_JOINTS;
 
 /// How [`super::Robot::solve_ik_with`] searches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +20,7 @@ pub struct IkOptions {
     /// Most iterations.
     pub max_iterations: u32,
     /// Share of the way to the home posture that an iteration goes within the null space, while it is still far from the target. Only a
-    /// redundant arm has one: there the pull makes the posture depend less on the way that led there.
+    /// redundant arm has one: without the pull its posture drifts when the tool goes in circles.
     pub home_pull: f64,
 }
 
@@ -69,7 +70,8 @@ impl Problem<'_> {
             let turn = Frame { rotation: target.rotation * tool.rotation.transpose(), position };
             let rotation = turn.quaternion().scaled_axis();
             let (position_error_m, rotation_error_rad) = (position.norm(), rotation.norm());
-            if position_error_m <= options.position_tolerance_m && rotation_error_rad <= options.rotation_tolerance_rad {
+            if position_error_m <= options.position_tolerance_m && rotation_error_rad <= options.rotation_tolerance_rad
+            {
                 return Ok(q);
             }
             if iterations == options.max_iterations {
@@ -85,6 +87,10 @@ impl Problem<'_> {
             }
             let jacobian = posture.jacobian_at(n, &tool.position);
             q += self.limited_step(&q, &jacobian, &error, &pull);
+            for (j, limit) in self.limits.iter().enumerate() {
+                // Only rounding: the step keeps the limits.
+                q[j] = q[j].clamp(limit.lower_rad, limit.upper_rad);
+            }
         }
     }
 
@@ -92,7 +98,7 @@ impl Problem<'_> {
     fn limited_step(
         &self,
         q: &JointVector,
-        jacobian: &super::Jacobian,
+        jacobian: &Jacobian,
         error: &Vector6<f64>,
         pull: &JointVector,
     ) -> JointVector {
@@ -101,14 +107,9 @@ impl Problem<'_> {
         let mut free = *jacobian;
         let mut wanted = *error;
         let mut step = JointVector::zeros();
-        let mut stuck = [false; crate::state::MAX_JOINTS];
+        let mut stuck = [false; MAX_JOINTS];
         loop {
-            let mut pull = *pull;
-            for j in 0..n {
-                if stuck[j] {
-                    pull[j] = 0.0;
-                }
-            }
+            let pull = JointVector::from_fn(|j, _| if stuck[j] { 0.0 } else { pull[j] });
             // step = pull + Jᵀ (J Jᵀ + λ)⁻¹ (error − J pull): towards the target first, the pull only in the null space.
             let gram = free * free.transpose() + Matrix6::identity() * damping;
             let Some(factor) = gram.cholesky() else { return JointVector::zeros() };
@@ -124,8 +125,8 @@ impl Problem<'_> {
                 }
                 step[j] = moving[j];
                 let limit = &self.limits[j];
-                let kept = (q[j] + step[j]).clamp(limit.lower_rad, limit.upper_rad) - q[j];
-                if kept != step[j] && !limit.contains(q[j] + step[j]) {
+                if !limit.contains(q[j] + step[j]) {
+                    let kept = (q[j] + step[j]).clamp(limit.lower_rad, limit.upper_rad) - q[j];
                     step[j] = kept;
                     stuck[j] = true;
                     wanted -= free.column(j) * kept;
@@ -134,16 +135,8 @@ impl Problem<'_> {
                 }
             }
             if !again {
-                break;
+                return step;
             }
         }
-        // Rounding of q + (limit − q) must not leave the limits.
-        for j in 0..n {
-            let limit = &self.limits[j];
-            if !limit.contains(q[j] + step[j]) {
-                step[j] = 0.0;
-            }
-        }
-        step
     }
 }

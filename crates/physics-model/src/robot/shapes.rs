@@ -107,9 +107,7 @@ mod tests {
     fn shapes(collisions: &[(&str, &str)]) -> Result<Vec<ToolShape>, String> {
         let body: String = collisions
             .iter()
-            .map(|(xyz, g)| {
-                format!("<collision><origin xyz=\"{xyz}\"/><geometry><{g}/></geometry></collision>")
-            })
+            .map(|(xyz, g)| format!("<collision><origin xyz=\"{xyz}\"/><geometry><{g}/></geometry></collision>"))
             .collect();
         let text = format!("<robot name=\"r\"><link name=\"hand\">{body}</link></robot>");
         link_shapes(&urdf_rs::read_from_string(&text).expect("URDF").links[0], &Frame::identity())

@@ -1,5 +1,6 @@
 //! Small arms written here: what a URDF may and may not be.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
@@ -124,7 +125,10 @@ fn unknown_names_are_named_with_what_would_do() {
 #[test]
 fn unfit_joints_are_errors() {
     let text = message(|c| c.locked_joints.clear(), ARM);
-    assert!(text.contains("\"slide\"") && text.contains("expected it in robot.actuated_joints, or in robot.lock"), "{text}");
+    assert!(
+        text.contains("\"slide\"") && text.contains("expected it in robot.actuated_joints, or in robot.lock"),
+        "{text}"
+    );
     let text = message(|c| _ = c.locked_joints.insert("slide".into(), 0.3), ARM);
     assert!(text.contains("locked at 0.3, expected 0 to 0.2"), "{text}");
     let text = message(|c| c.actuated_joints.reverse(), ARM);
@@ -165,4 +169,60 @@ fn impossible_values_are_errors() {
     assert!(message(|c| c.tool_rotation[0][0] = -1.0, ARM).contains("tool_rotation"));
     assert!(message(|c| c.tool_rotation[0][0] = f64::NAN, ARM).contains("tool_rotation"));
     assert!(message(|c| c.tool_link = "upper".into(), ARM).contains("expected a link that moves with Some(\"elbow\")"));
+}
+
+fn sawyer() -> Robot {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let config = RobotConfig {
+        name: "sawyer".into(),
+        urdf: "assets/robots/sawyer.urdf".into(),
+        base_link: "right_arm_base_link".into(),
+        tip_link: "right_hand".into(),
+        tool_link: "tool_center".into(),
+        wrist_link: "right_hand".into(),
+        actuated_joints: (0..7).map(|j| format!("right_j{j}")).collect(),
+        locked_joints: BTreeMap::from([("head_pan".into(), 0.0)]),
+        home_rad: vec![-0.3222, -0.7935, 0.0381, 1.9327, -0.0638, 0.4328, 3.079],
+        tool_rotation: [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
+    };
+    Robot::load(&config, &root).expect("sawyer")
+}
+
+#[test]
+fn the_other_joints_make_up_for_one_at_its_limit() {
+    let mut robot = sawyer();
+    let home = robot.home_rad.clone();
+    robot.limits[0].lower_rad = home[0] - 0.05;
+    robot.limits[0].upper_rad = home[0] + 0.05;
+    for x in -4..=4 {
+        for y in -4..=4 {
+            let mut target = robot.base_from_tool(&home);
+            target.translation.vector += Vector3::new(0.02 * f64::from(x), 0.04 * f64::from(y), 0.0);
+            let q = robot.solve_ik(&home, &target).unwrap_or_else(|e| panic!("{x} {y}: {e}"));
+            assert!(robot.limits.iter().zip(&q).all(|(limit, value)| limit.contains(*value)), "{x} {y}: {q:?}");
+        }
+    }
+}
+
+#[test]
+fn posture_of_a_redundant_arm_does_not_drift_in_circles() {
+    let robot = sawyer();
+    let home = robot.base_from_tool(&robot.home_rad);
+    let drift = |home_pull| {
+        let options = IkOptions { home_pull, ..IkOptions::default() };
+        let mut q = robot.home_rad.clone();
+        for side in 0..80 {
+            let (dx, dy) = [(0.0, 0.02), (0.02, 0.0), (0.0, -0.02), (-0.02, 0.0)][side % 4];
+            for _ in 0..5 {
+                let mut target = robot.base_from_tool(&q);
+                target.rotation = home.rotation;
+                target.translation.vector += Vector3::new(dx, dy, 0.0);
+                q = robot.solve_ik_with(&q, &target, &options).expect("within reach");
+            }
+        }
+        assert!((robot.base_from_tool(&q).translation.vector - home.translation.vector).norm() < 5e-5);
+        q.iter().zip(&robot.home_rad).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let (with, without) = (drift(IkOptions::default().home_pull), drift(0.0));
+    assert!(with < 0.01 && without > 0.1, "{with} rad with the pull, {without} rad without");
 }

@@ -166,11 +166,7 @@ fn joint_table<'a>(
     Ok(joints)
 }
 
-fn check_names(
-    config: &RobotConfig,
-    joints: &BTreeMap<&str, &urdf_rs::Joint>,
-    path: &Path,
-) -> Result<(), RobotError> {
+fn check_names(config: &RobotConfig, joints: &BTreeMap<&str, &urdf_rs::Joint>, path: &Path) -> Result<(), RobotError> {
     let actuated = config.actuated_joints.iter().map(|name| ("actuated_joints", name));
     let locked = config.locked_joints.keys().map(|name| ("locked_joints", name));
     for (key, name) in actuated.chain(locked) {
@@ -250,7 +246,8 @@ fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> 
         JointType::Revolute => (joint.limit.lower, joint.limit.upper),
         JointType::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
         _ => {
-            let problem = format!("is {:?}, expected revolute or continuous in robot.actuated_joints", joint.joint_type);
+            let problem =
+                format!("is {:?}, expected revolute or continuous in robot.actuated_joints", joint.joint_type);
             return Err(joint_error(path, &joint.name, problem));
         }
     };

@@ -27,7 +27,8 @@ fn episodes(count: usize, spread: f32, rng: &mut Rng) -> Vec<Sequence> {
     let normal = |rng: &mut Rng| rng.sample::<f32, _>(StandardNormal);
     let mut draw = |_| {
         let class = u8::from(rng.random::<bool>());
-        let rows: Vec<f32> = (0..4).map(|i| if i % 2 == 0 { 2.0 + 3.0 * spread * normal(rng) } else { normal(rng) }).collect();
+        let rows: Vec<f32> =
+            (0..4).map(|i| if i % 2 == 0 { 2.0 + 3.0 * spread * normal(rng) } else { normal(rng) }).collect();
         let mask = [1.0, f32::from(class)].repeat(2);
         Sequence { observations: vec![0.0; 2], targets: rows, mask, classes: vec![class; 2], steps: 2 }
     };
@@ -39,7 +40,7 @@ fn report(count: usize, spread: f32) -> Calibration {
     let sequences = episodes(count, spread, &mut Seed(4).stream(Purpose::Test, 0));
     let references: Vec<&Sequence> = sequences.iter().collect();
     let baseline = Baseline::fit(&layout, &normalisation, &references);
-    let contact = |index: usize| if index % 2 == 0 { Some(1) } else { None };
+    let contact = |index: usize| if index.is_multiple_of(2) { Some(1) } else { None };
     let held: Vec<Episode> =
         sequences.iter().enumerate().map(|(i, sequence)| Episode { sequence, contact: contact(i) }).collect();
     calibrate(&inference, &layout, &baseline, &held)

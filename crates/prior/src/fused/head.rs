@@ -91,9 +91,9 @@ impl<T: Real> Row<T> {
         let (low, high) = (T::from_f64(LOG_STDDEV_LIMITS.0), T::from_f64(LOG_STDDEV_LIMITS.1));
         // Logits become the responsibilities p(k | targets, classes), then the gradient.
         softmax(&self.joint, logits);
-        for component in 0..k {
-            let responsibility = scale * logits[component];
-            logits[component] = scale * self.share[component] - responsibility;
+        for (component, logit) in logits.iter_mut().enumerate() {
+            let responsibility = scale * *logit;
+            *logit = scale * self.share[component] - responsibility;
             let at = component * d..(component + 1) * d;
             let (means, log_stddevs) = (&mut means[at.clone()], &mut log_stddevs[at.clone()]);
             let (standard, inverse) = (&self.standard[at.clone()], &self.inverse[at]);
@@ -140,8 +140,10 @@ fn log_sum_exp<T: Real>(values: &[T]) -> f64 {
 }
 
 /// exp(values) / Σ exp(values).
+#[inline(always)]
 fn softmax<T: Real>(values: &[T], target: &mut [T]) {
-    let largest = values.iter().copied().fold(values[0], |largest, value| if value > largest { value } else { largest });
+    let largest =
+        values.iter().copied().fold(values[0], |largest, value| if value > largest { value } else { largest });
     let mut total = T::ZERO;
     for (target, &value) in target.iter_mut().zip(values) {
         *target = (value - largest).exp();

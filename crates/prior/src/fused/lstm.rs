@@ -76,7 +76,7 @@ impl<T: Real> Layer<T> {
         }
     }
 
-    /// Turns `upstream`, the gradient of the output, into gradients of the weights (accumulated) and of the inputs.
+    /// Turns `upstream`, the gradient of `hidden`, into gradients of the weights (accumulated) and of the inputs.
     ///
     /// # Shapes
     ///
@@ -88,14 +88,10 @@ impl<T: Real> Layer<T> {
         weights: [&[T]; 2],
         gradients: [&mut [T]; 3],
         upstream: &mut [T],
-        dropout: Option<&[T]>,
         input_gradient: Option<&mut [T]>,
     ) {
         let [input, recurrent] = weights;
         let (width, rows) = (self.width, batch.rows);
-        if let Some(factors) = dropout {
-            upstream.iter_mut().zip(factors).for_each(|(gradient, &factor)| *gradient = *gradient * factor);
-        }
         let widest = batch.active.first().copied().unwrap_or(0) * width;
         self.hidden_gradient.resize(widest, T::ZERO);
         self.cell_gradient.clear();
@@ -135,7 +131,6 @@ impl<T: Real> Layer<T> {
 }
 
 /// Gates from their sums, then cell and hidden state; all `[alive, …]`.
-#[inline(always)]
 fn activate<T: Real>(
     width: usize,
     gates: &mut [T],
@@ -173,7 +168,6 @@ fn activate<T: Real>(
 
 /// Gradients of the gates before activation (in place of the gates), and of the cell one step earlier (in place of
 /// `cell_gradient`, which holds what flows back from the step after); all `[alive, …]`.
-#[inline(always)]
 fn deactivate<T: Real>(
     width: usize,
     gates: &mut [T],

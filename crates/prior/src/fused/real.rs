@@ -2,6 +2,33 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
+/// Defines a function that is compiled twice, for the baseline and for AVX2, and picks at run time.
+///
+/// The bodies are element by element without fused multiply-add, so both give the same bits.
+macro_rules! wide {
+    ($(#[$meta:meta])* fn $name:ident $(<$t:ident>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+        $(#[$meta])*
+        fn $name $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? {
+            #[inline(always)]
+            fn body $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? $body
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2")]
+                fn avx2 $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? {
+                    body($($arg),*)
+                }
+                if std::arch::is_x86_feature_detected!("avx2") {
+                    #[expect(unsafe_code, reason = "the only condition, that the CPU has AVX2, was just tested")]
+                    // SAFETY: the CPU has AVX2.
+                    return unsafe { avx2($($arg),*) };
+                }
+            }
+            body($($arg),*)
+        }
+    };
+}
+pub(crate) use wide;
+
 /// f32 or f64.
 ///
 /// The f32 functions are branch-free polynomials (a few units in the last place) that the compiler vectorises; they use no
@@ -106,7 +133,7 @@ impl Real for f32 {
         let x = self.limit(-7.905_311, 7.905_311);
         let x2 = x * x;
         let p = -2.760_768_5e-16;
-        let p = p * x2 + 2.000_187_9e-13;
+        let p = p * x2 + 2.000_188e-13;
         let p = p * x2 - 8.604_672e-11;
         let p = p * x2 + 5.122_297_2e-8;
         let p = p * x2 + 1.485_722_4e-5;
@@ -163,13 +190,22 @@ impl<'a, T> Matrix<'a, T> {
 ///
 /// Runs on one thread, so the result does not depend on the number of threads.
 #[expect(unsafe_code, reason = "the gemm crate takes raw pointers; the asserts above the call bound every access")]
-pub(crate) fn product<T: Real>(target: &mut [T], target_stride: usize, accumulate: bool, left: Matrix<T>, right: Matrix<T>) {
+pub(crate) fn product<T: Real>(
+    target: &mut [T],
+    target_stride: usize,
+    accumulate: bool,
+    left: Matrix<T>,
+    right: Matrix<T>,
+) {
     let (rows, columns, inner) = (left.rows, right.columns, left.columns);
     assert_eq!(inner, right.rows, "{rows}×{inner} times {}×{columns}", right.rows);
     if rows == 0 || columns == 0 || (inner == 0 && accumulate) {
         return;
     }
-    assert!(columns <= target_stride || rows == 1, "rows of the target overlap: {columns} columns, stride {target_stride}");
+    assert!(
+        columns <= target_stride || rows == 1,
+        "rows of the target overlap: {columns} columns, stride {target_stride}"
+    );
     assert!((rows - 1) * target_stride + columns <= target.len(), "target too short");
     assert!(left.reach() <= left.data.len() && right.reach() <= right.data.len(), "operand too short");
     // SAFETY: all accesses lie within the slices by the asserts; `target` is borrowed mutably, so it aliases neither operand.

@@ -75,9 +75,8 @@ impl Trainer {
             return Err(Error::OtherData { path, found: manifest.data_blake3, expected: trainer.data_blake3 });
         }
         let specs = trainer.dimensions.tensors();
-        let weights = |file: &FileRef| {
-            files::from_safetensors(&files::read_blob(dir, file)?, &specs, &dir.join(&file.name))
-        };
+        let weights =
+            |file: &FileRef| files::from_safetensors(&files::read_blob(dir, file)?, &specs, &dir.join(&file.name));
         trainer.parameters = weights(&manifest.current)?;
         trainer.best = weights(&manifest.best)?;
         trainer.network = Network::new(&trainer.parameters, &trainer.dimensions, &device().autodiff());

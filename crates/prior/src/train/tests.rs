@@ -72,9 +72,18 @@ fn a_known_mixture_is_recovered() {
     let mixture = inference.step(&[0.1]);
     let low = usize::from(mixture.means(0)[0] > mixture.means(1)[0]);
     assert!((mixture.weights()[low] - 0.3).abs() < 0.05, "{mixture:?}");
-    assert!((mixture.means(low)[0] + 2.0).abs() < 0.12 && (mixture.means(1 - low)[0] - 1.0).abs() < 0.06, "{mixture:?}");
-    assert!((mixture.stddevs(low)[0] - 0.5).abs() < 0.08 && (mixture.stddevs(1 - low)[0] - 0.2).abs() < 0.05, "{mixture:?}");
-    assert!(mixture.log_classes(low, 0)[0].exp() > 0.97 && mixture.log_classes(1 - low, 0)[1].exp() > 0.97, "{mixture:?}");
+    assert!(
+        (mixture.means(low)[0] + 2.0).abs() < 0.12 && (mixture.means(1 - low)[0] - 1.0).abs() < 0.06,
+        "{mixture:?}"
+    );
+    assert!(
+        (mixture.stddevs(low)[0] - 0.5).abs() < 0.08 && (mixture.stddevs(1 - low)[0] - 0.2).abs() < 0.05,
+        "{mixture:?}"
+    );
+    assert!(
+        mixture.log_classes(low, 0)[0].exp() > 0.97 && mixture.log_classes(1 - low, 0)[1].exp() > 0.97,
+        "{mixture:?}"
+    );
     // Entropy of the truth: the components do not overlap, so H(shares) + Σ share · ½ ln(2πe σ²).
     let gaussian = |stddev: f64| 0.5 * (2.0 * std::f64::consts::PI * std::f64::consts::E).ln() + stddev.ln();
     let entropy = -0.3 * 0.3_f64.ln() - 0.7 * 0.7_f64.ln() + 0.3 * gaussian(0.5) + 0.7 * gaussian(0.2);

@@ -1,0 +1,131 @@
+//! Bad input ends with exit code 2 and one sentence that names file, key and expectation; nothing is written.
+
+use std::path::Path;
+
+use end_to_end::{files, root, run, stderr};
+
+use crate::pipeline::trained;
+
+/// Runs, expects exit code 2 and one line that holds all `parts`.
+fn refused(binary: &str, arguments: &str, parts: &[&str]) {
+    let output = run(binary, arguments);
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{binary} {arguments}: {message}");
+    assert_eq!(message.trim().lines().count(), 1, "{binary} {arguments}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{binary} {arguments}: expected `{part}` in: {message}");
+    }
+    assert!(output.stdout.is_empty(), "{binary} {arguments}");
+}
+
+fn copy(from: &Path, to: &Path) {
+    for (path, bytes) in files(from) {
+        let target = to.join(path);
+        std::fs::create_dir_all(target.parent().unwrap()).unwrap();
+        std::fs::write(target, bytes).unwrap();
+    }
+}
+
+#[test]
+fn bad_scenarios_are_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let file = folder.path().join("mine.toml");
+    let eval = |rest: &str| format!("--methods no-rnn --out {} {rest}", out.display());
+    let cases: [(&str, &[&str]); 7] = [
+        ("--domain D9", &["unknown domain `D9`", "d1, d2, d3, d4, d5"]),
+        ("--domain D4 --robot panda", &["unknown robot `panda`", "jaco, sawyer"]),
+        ("--domain D4 --preset best", &["unknown preset `best`", "paper"]),
+        ("--domain D4 --set task.horizn=3", &["--set task.horizn=3", "`task.horizn`", "horizon"]),
+        ("--domain D4 --set task.goal.radius_cm=4", &["radius_cm", "radius_m"]),
+        ("--domain D4 --set task.goal.radius_m=\"4cm\"", &["task.goal.radius_m", "expected"]),
+        ("--domain D4 --set robot.urdf=assets/robots/none.urdf", &["none.urdf"]),
+    ];
+    for (arguments, parts) in cases {
+        refused("eval", &eval(arguments), parts);
+    }
+    let text = |rest: &str| format!("name = \"mine\"\n{rest}\n[evaluation]\ntrials = 1\n");
+    let contents: [(&str, &[&str]); 4] = [
+        ("[world]\nobstacle_mobilty = \"fixed\"", &["mine.toml", "`world.obstacle_mobilty`", "obstacle_mobility"]),
+        ("[task]\ndiscount = 2.0", &["mine.toml", "task.discount", "0 to 1"]),
+        ("version = 7", &["mine.toml", "version is 7", "reads version 1"]),
+        ("[task\n", &["mine.toml", "not valid TOML"]),
+    ];
+    for (content, parts) in contents {
+        std::fs::write(&file, text(content)).unwrap();
+        refused("eval", &eval(&format!("--domain {}", file.display())), parts);
+    }
+    refused("eval", &eval("--domain nowhere.toml"), &["nowhere.toml", "cannot be read"]);
+    assert!(!out.exists(), "a refused run leaves nothing behind");
+}
+
+#[test]
+fn priors_that_do_not_fit_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let eval = |robot: &str, prior: &Path| {
+        let (prior, out) = (prior.display(), out.display());
+        format!("--domain D4 --robot {robot} --quick --methods rnn-max --prior {prior} --out {out}")
+    };
+    let trained = &trained().prior;
+    refused("eval", &eval("jaco", trained), &["prior.json", "sawyer", "jaco"]);
+    let missing = folder.path().join("missing");
+    refused("eval", &eval("sawyer", &missing), &["missing"]);
+    let broken = folder.path().join("broken");
+    copy(trained, &broken);
+    let weights = files(&broken).into_iter().find(|(path, _)| path.extension().is_some_and(|e| e == "safetensors"));
+    let (name, bytes) = weights.expect("a prior has a weights file");
+    std::fs::write(broken.join(&name), &bytes[..bytes.len() / 2]).unwrap();
+    refused("eval", &eval("sawyer", &broken), &[&name.display().to_string()]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn damaged_and_foreign_datasets_are_refused_and_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken");
+    copy(&trained().data, &broken);
+    let shard = broken.join("data/chunk-000/file-003.parquet");
+    let bytes = std::fs::read(&shard).unwrap();
+    std::fs::write(&shard, &bytes[..bytes.len() / 2]).unwrap();
+    let out = folder.path().join("prior");
+    let train = |robot: &str, data: &Path| {
+        format!("--robot {robot} --epochs 1 --data {} --out {}", data.display(), out.display())
+    };
+    refused("train", &train("sawyer", &broken), &["file-003.parquet"]);
+    refused("train", &train("jaco", &trained().data), &["info.json", "sawyer", "expected jaco"]);
+    refused("train", &train("sawyer", &folder.path().join("none")), &["none"]);
+    assert!(!out.exists());
+
+    // Another seed into a finished dataset.
+    let before = files(&trained().data);
+    let arguments = format!("--transitions 2000 --shards 10 --seed 2 --out {}", trained().data.display());
+    refused("datagen", &arguments, &["plan.json", "seed"]);
+    assert!(files(&trained().data) == before);
+}
+
+#[test]
+fn a_run_folder_of_another_run_is_refused_and_left_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let eval = |seed: u64| {
+        let out = folder.path().display();
+        format!("--domain D1 --quick --trials 1 --methods heuristic --seed {seed} --out {out}")
+    };
+    assert!(run("eval", &eval(1)).status.success());
+    let before = files(folder.path());
+    refused("eval", &eval(2), &["run.json", "`seed` is 1", "has 2"]);
+    assert!(files(folder.path()) == before);
+}
+
+#[test]
+fn programs_outside_the_project_say_so() {
+    let elsewhere = tempfile::tempdir().unwrap();
+    let output = end_to_end::program("eval")
+        .current_dir(elsewhere.path())
+        .args(["--domain", "D1", "--methods", "heuristic"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("scenarios/base.toml"), "{}", stderr(&output));
+    assert!(root().join("scenarios/base.toml").is_file());
+}
