@@ -138,6 +138,15 @@ impl<'a> Agent<'a> {
                 }
                 Mind::Heuristic => Mind::Heuristic,
             };
+            tracing::debug!(
+                time,
+                action = record.action.index(),
+                value = record.value,
+                reward = record.reward,
+                acceptance = record.update.as_ref().map(|u| u.acceptance),
+                obstacle_share = record.obstacle_share,
+                "step"
+            );
             steps.push(record);
         }
         let rewards = steps.iter().map(|s| s.reward);

@@ -53,6 +53,9 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
+    // Silent unless RUST_LOG asks: results go to files, progress to the bar.
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "off".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
     let arguments = Arguments::parse();
     match run(&arguments) {
         Ok(true) => ExitCode::SUCCESS,

@@ -59,6 +59,23 @@ pub enum EffectConfig {
 }
 
 impl EffectConfig {
+    /// What is wrong with the parameters, if anything.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let (key, value, limit, unit) = match self {
+            Self::ViscousDamping(e) => ("viscous_damping.coefficient_nspm", e.coefficient_nspm, [0.0, 1000.0], "N·s/m"),
+            Self::RollingResistance(e) => ("rolling_resistance.lever_m", e.lever_m, [0.0, 0.1], "m"),
+            Self::TableTilt(e) => {
+                let steeper = if e.slope_x_rad.abs() > e.slope_y_rad.abs() { e.slope_x_rad } else { e.slope_y_rad };
+                ("table_tilt.slope_x_rad and slope_y_rad", steeper, [-0.7, 0.7], "rad")
+            }
+        };
+        let [low, high] = limit;
+        // Also false for NaN.
+        let good = (low..=high).contains(&value);
+        (!good).then(|| format!("{key}: expected {low} to {high} {unit}, found {value}"))
+    }
+
     /// The effect, ready to use.
     #[must_use]
     pub fn build(&self) -> Box<dyn Effect> {

@@ -183,7 +183,7 @@ mod tests {
         let particle = particle(&draw, 7, -0.1);
         assert_eq!(particle.theta.classes(), [0, 1]);
         assert!((particle.theta.object.size_m[1] - 0.07).abs() < 1e-6);
-        assert!((particle.state.object.position_m[2] - (-0.055)).abs() < 1e-12, "rests at half its height");
+        assert!((particle.state.object.position_m[2] - (-0.055)).abs() < 1e-7, "rests at half its height");
         assert!((particle.state.object.yaw_rad() - 0.4).abs() < 1e-6);
         // The obstacle's quaternion was given with the other sign.
         assert!((particle.state.obstacle.unwrap().yaw_rad() - 0.4).abs() < 1e-6);

@@ -186,7 +186,17 @@ impl Scenario {
         let rewards =
             [t.reward.step, t.reward.large_force, t.reward.out_of_reach, t.reward.object_moved, t.reward.goal];
         let period = w.control_period_secs;
-        check(positive(period) && period <= 0.1, "world.control_period_secs", "above 0 and at most 0.1 s", &period)
+        let effects = self.effects.truth.iter().chain(&self.effects.model);
+        check(self.version == VERSION, "version", &format!("{VERSION}"), &self.version)
+            .or_else(|| effects.clone().find_map(|effect| effect.problem().map(|p| format!("effects: {p}"))))
+            .or_else(|| {
+                check(
+                    positive(period) && period <= 0.1,
+                    "world.control_period_secs",
+                    "above 0 and at most 0.1 s",
+                    &period,
+                )
+            })
             .or_else(|| {
                 check((1..=10_000).contains(&w.control_steps), "world.control_steps", "1 to 10000", &w.control_steps)
             })

@@ -87,3 +87,15 @@ fn confidence_of_one_half_is_calibrated_and_confusion_counts_everything() {
     assert!(honest.obstacle_after_contact_accuracy.is_some_and(|accuracy| (accuracy - 0.5).abs() < 0.08));
     assert!(honest.shape_accuracy.is_some());
 }
+
+#[test]
+fn baseline_of_a_constant_has_the_spread_that_the_network_can_state_at_least() {
+    let layout = layout(1, 1, &[2]);
+    let (observations, targets, mask) = (vec![0.0; 3], vec![7.0; 3], vec![1.0; 3]);
+    let sequence = Sequence { observations, targets, mask, classes: vec![0, 0, 1], steps: 3 };
+    let baseline = Baseline::fit(&layout, &Normalisation::fit(&layout, &[&sequence]), &[&sequence]);
+    assert_eq!(baseline.continuous[0], Scale { mean: 7.0, stddev: (-5.0_f64).exp() });
+    let exact = 5.0 - HALF_LOG_TAU + 0.6_f64.ln();
+    let log_density = baseline.log_density(&[7.0], &[true], &[0]);
+    assert!((log_density - exact).abs() < 1e-12, "counts start from one a label: {log_density} {exact}");
+}

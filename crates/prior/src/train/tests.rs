@@ -87,6 +87,8 @@ fn a_known_mixture_is_recovered() {
     // Entropy of the truth: the components do not overlap, so H(shares) + Σ share · ½ ln(2πe σ²).
     let gaussian = |stddev: f64| 0.5 * (2.0 * std::f64::consts::PI * std::f64::consts::E).ln() + stddev.ln();
     let entropy = -0.3 * 0.3_f64.ln() - 0.7 * 0.7_f64.ln() + 0.3 * gaussian(0.5) + 0.7 * gaussian(0.2);
+    let last = trainer.curve().last().unwrap();
+    assert!((last.training_nll - last.held_out_nll).abs() < 0.15, "both in original units: {last:?}");
     assert!((trainer.held_out_nll() - entropy).abs() < 0.12, "{} {entropy}", trainer.held_out_nll());
 }
 
@@ -136,6 +138,7 @@ fn a_run_that_was_stopped_ends_with_the_same_weights() {
         second.save(dir.path()).unwrap();
         assert_eq!([first.epoch().unwrap(), first.epoch().unwrap()], reports);
         let mut third = Trainer::resume(dir.path(), &layout, &data).unwrap();
+        assert_eq!(third.checkpoint(BTreeMap::new()), second.checkpoint(BTreeMap::new()));
         third.epoch().unwrap();
         third.epoch().unwrap();
         assert_eq!(third.parameters(), &straight);
@@ -154,8 +157,19 @@ fn a_training_state_of_other_data_or_another_layout_is_refused() {
     let mut other = layout.clone();
     other.robot = "jaco".into();
     assert!(matches!(Trainer::resume(dir.path(), &other, &data).err(), Some(Error::Robot { .. })));
-    data[3].observations[0] += 1.0;
-    assert!(matches!(Trainer::resume(dir.path(), &layout, &data).err(), Some(Error::OtherData { .. })));
+    let changes: [fn(&mut Sequence); 4] = [
+        |s| s.observations[0] += 1.0,
+        |s| s.targets[0] += 1.0,
+        |s| s.mask[0] = 1.0 - s.mask[0],
+        |s| s.classes[0] = (s.classes[0] + 1) % 3,
+    ];
+    for change in changes {
+        let kept = data[3].clone();
+        change(&mut data[3]);
+        assert!(matches!(Trainer::resume(dir.path(), &layout, &data).err(), Some(Error::OtherData { .. })));
+        data[3] = kept;
+    }
+    assert!(Trainer::resume(dir.path(), &layout, &data).is_ok());
 }
 
 #[test]
@@ -219,6 +233,21 @@ fn clipping_bounds_the_first_step_of_plain_gradients() {
     let moved = moved.map(|(now, before)| (now - before).abs()).fold(0.0, f32::max);
     assert!(moved < 5e-3, "{moved}");
     assert!(unclipped.gradient_norm > 0.1 && clipped.gradient_norm > 0.1, "the norm reported is that before clipping");
+}
+
+#[test]
+fn every_step_drops_other_units() {
+    let (mut config, layout, data) = small_problem();
+    (config.learning_rate, config.dropout, config.chunks) = (1e-12, 0.5, 1);
+    let mut losses = |dropout: f64| {
+        config.dropout = dropout;
+        let mut trainer = Trainer::new(config.clone(), layout.clone(), &data, Seed(1)).unwrap();
+        [0, 1].map(|_| trainer.step(&[0, 1, 2]).unwrap().loss)
+    };
+    let [first, second] = losses(0.0);
+    assert!((first - second).abs() < 1e-6, "the weights do not move: {first} {second}");
+    let [first, second] = losses(0.5);
+    assert!((first - second).abs() > 1e-3, "{first} {second}");
 }
 
 #[test]

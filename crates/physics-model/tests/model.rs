@@ -1,0 +1,292 @@
+//! The pushing task as a generative model: conformance, rewards, sensors, determinism.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use physics_model::config::{
+    ForceSensing, GoalConfig, NoiseConfig, ObstacleMobility, PerturbConfig, ReachConfig, RewardConfig, SensorConfig,
+    TaskConfig, WorldConfig,
+};
+use physics_model::robot::{Robot, RobotConfig};
+use physics_model::world::World;
+use physics_model::{
+    Action, BodyState, HeuristicPolicy, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushConfig, PushModel,
+    State, Theta,
+};
+use pomdp::conformance::check_generative_model;
+use pomdp::{Outcome, Policy as _, Purpose, Seed};
+use proptest::prelude::*;
+
+/// Moves along +y and −y.
+const PLUS_Y: usize = 2;
+const MINUS_Y: usize = 6;
+
+fn root() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_path_buf()
+}
+
+fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f64>) {
+    let text = std::fs::read_to_string(root().join(format!("scenarios/robots/{arm}.toml"))).unwrap();
+    let file: toml::Table = toml::from_str(&text).unwrap();
+    let config: RobotConfig = file["robot"].clone().try_into().unwrap();
+    let robot = Arc::new(Robot::load(&config, &root()).unwrap());
+    let (table, tool_start_m, sensing, limit) = match arm {
+        "sawyer" => (-0.1, [0.53, -0.22, -0.05], ForceSensing::Wrist, 100.0),
+        _ => (0.0, [0.46, -0.26, 0.05], ForceSensing::JointTorques, 30.0),
+    };
+    let push = PushConfig {
+        world: WorldConfig {
+            control_period_secs: 1.0 / 60.0,
+            control_steps: 20,
+            solver_iterations: 2,
+            contact_frequency_hz: 60.0,
+            contact_damping_ratio: 5.0,
+            table_height_m: table,
+            gravity_mps2: 9.81,
+            tool_friction: 0.2,
+            obstacle_friction: 0.5,
+            restitution: 0.0,
+            obstacle_mobility: mobility,
+        },
+        task: TaskConfig {
+            horizon: 30,
+            discount: 0.95,
+            step_m: 0.02,
+            tool_start_m,
+            reach: ReachConfig { x_m: [0.35, 0.6], y_m: [-0.3, 0.3], z_m: [table + 0.04, table + 0.12] },
+            goal: GoalConfig { x_m: tool_start_m[0], y_m: 0.07, radius_m: 0.05 },
+            reward: RewardConfig {
+                step: -1.0,
+                large_force: -5.0,
+                out_of_reach: -5.0,
+                object_moved: 10.0,
+                goal: 100.0,
+                moved_threshold_m: 0.005,
+            },
+        },
+        sensor: SensorConfig {
+            force: sensing,
+            large_force_limit: limit,
+            noise: NoiseConfig {
+                joint_rad: 1e-9,
+                force_n: 1e-9,
+                torque_nm: 1e-9,
+                joint_torque_nm: 1e-9,
+                position_m: 1e-9,
+                orientation_rad: 1e-9,
+            },
+        },
+        perturb: PerturbConfig {
+            position_m: 0.01,
+            yaw_rad: 0.1,
+            linear_mps: 0.01,
+            angular_rps: 0.1,
+            mass_share: 0.2,
+            com_m: 0.003,
+            friction: 0.05,
+            size_m: 0.005,
+        },
+        effects: vec![],
+    };
+    let model = PushModel::new(push, robot);
+    let joints = model.joints_for(&config.home_rad, tool_start_m).unwrap();
+    (model, joints)
+}
+
+fn particle(model: &PushModel, joints: &[f64], y_m: f64) -> Particle {
+    let config = model.config();
+    let (x, table) = (config.task.tool_start_m[0], config.world.table_height_m);
+    let object = ObjectTheta {
+        shape: ObjectShape::Box,
+        mass_kg: 0.5,
+        com_m: [0.0; 3],
+        friction: 0.4,
+        size_m: [0.08, 0.08, 0.1],
+    };
+    Particle::new(
+        State { joints_rad: joints.to_vec(), object: BodyState::at_rest([x, y_m, table + 0.05], 0.0), obstacle: None },
+        Theta { object, obstacle: None },
+    )
+}
+
+fn with_obstacle(mut particle: Particle, y_m: f64) -> Particle {
+    let mut position = particle.state.object.position_m;
+    position[1] = y_m;
+    particle.theta.obstacle = Some(ObstacleTheta { shape: ObjectShape::Box, mass_kg: 1.0, size_m: [0.08, 0.08, 0.1] });
+    particle.state.obstacle = Some(BodyState::at_rest(position, 0.0));
+    particle
+}
+
+#[test]
+fn both_arms_conform_to_the_generative_model() {
+    for arm in ["sawyer", "jaco"] {
+        let (model, joints) = model(arm, ObstacleMobility::Movable);
+        let near = particle(&model, &joints, -0.1);
+        let blocked = with_obstacle(near.clone(), 0.0);
+        check_generative_model(&model, &[near, blocked], 12);
+    }
+}
+
+#[test]
+fn a_push_along_the_path_earns_the_rewards_in_turn() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let mut particle = particle(&model, &joints, -0.12);
+    let mut rng = Seed(1).stream(Purpose::Test, 0);
+    let mut rewards = Vec::new();
+    let mut outcome = Outcome::Continue;
+    while outcome == Outcome::Continue && rewards.len() < 20 {
+        let step = model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng).0;
+        rewards.push(step.reward);
+        outcome = step.outcome;
+    }
+    assert_eq!(outcome, Outcome::Terminal);
+    assert_eq!(rewards.iter().filter(|r| **r == 9.0).count(), 1, "moved once: {rewards:?}");
+    assert_eq!(rewards.last(), Some(&99.0), "{rewards:?}");
+    assert!((particle.state.object.position_m[1] - 0.07).abs() <= 0.05);
+}
+
+#[test]
+fn a_move_out_of_reach_costs_five_and_moves_nothing() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let mut particle = particle(&model, &joints, 0.25);
+    let mut rng = Seed(1).stream(Purpose::Test, 0);
+    for _ in 0..4 {
+        assert_eq!(model.act(&mut particle, Action::ALL[MINUS_Y], &mut rng).0.reward, -1.0);
+    }
+    let before = particle.clone();
+    let (step, report) = model.act(&mut particle, Action::ALL[MINUS_Y], &mut rng);
+    assert!(report.events.out_of_reach && step.reward == -6.0, "{step:?}");
+    assert_eq!(particle.state, before.state);
+}
+
+#[test]
+fn a_push_against_a_fixed_obstacle_is_a_large_force_and_stops_the_arm() {
+    for arm in ["sawyer", "jaco"] {
+        let (model, joints) = model(arm, ObstacleMobility::Fixed);
+        let mut particle = with_obstacle(particle(&model, &joints, -0.1), -0.01);
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        let mut large = None;
+        for _ in 0..9 {
+            let start = model.tool_position_m(&particle.state.joints_rad)[1];
+            let (step, report) = model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng);
+            let advance = model.tool_position_m(&particle.state.joints_rad)[1] - start;
+            if report.events.large_force {
+                large = Some((step.reward, advance, report.obstacle_touched));
+                break;
+            }
+            assert!((advance - 0.02).abs() < 1e-5, "a free move has its length: {advance}");
+        }
+        let (reward, advance, touched) = large.unwrap_or_else(|| panic!("{arm}: no large force"));
+        assert!(touched && advance < 0.0195, "{arm}: stopped after {advance} m");
+        assert!(reward == -6.0 || reward == 4.0, "{arm}: {reward}");
+    }
+}
+
+#[test]
+fn the_wrist_feels_the_push_in_its_own_axes() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let mut particle = particle(&model, &joints, -0.155);
+    let mut rng = Seed(1).stream(Purpose::Test, 0);
+    model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng);
+    let step = model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng).0;
+    let v = &step.observation.0;
+    let (force, torque) = (&v[7..10], &v[10..13]);
+    // The hand points down with its x axis along the base's y (tool_rotation): a push along +y is felt along −x of the wrist.
+    let expected = 0.4 * 0.5 * 9.81;
+    assert!((-force[0] / expected - 1.0).abs() < 0.2, "{force:?}");
+    assert!(force[1].abs() < 0.2 * expected && force[2].abs() < 0.2 * expected, "{force:?}");
+    // The ball is 0.15 m along the wrist's z: τ_y = 0.15 f_x, up to the friction on the ball itself (0.025 m).
+    assert!((torque[1] / (0.15 * force[0]) - 1.0).abs() < 0.1, "{torque:?}");
+}
+
+#[test]
+fn a_free_jaco_holds_its_own_weight() {
+    let (model, joints) = model("jaco", ObstacleMobility::Fixed);
+    let mut particle = particle(&model, &joints, 0.1);
+    let observation = model.initial_observation(&mut particle, &mut Seed(1).stream(Purpose::Test, 0));
+    let gravity = model.robot().gravity_torque(&joints);
+    for (j, torque) in observation.0[..6].iter().enumerate() {
+        assert!((torque - gravity[j]).abs() < 1e-6, "joint {j}");
+    }
+    assert!(gravity.iter().any(|t| t.abs() > 1.0), "an arm has weight: {gravity:?}");
+}
+
+#[test]
+fn passing_clear_of_a_resting_object_equals_its_simulation() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Movable);
+    let start = with_obstacle(particle(&model, &joints, 0.0), 0.1);
+    let mut passed = start.clone();
+    model.act(&mut passed, Action::ALL[PLUS_Y], &mut Seed(1).stream(Purpose::Test, 0));
+    assert_eq!(passed.state.object, start.state.object, "not simulated at all");
+    let tool = model.tool_position_m(&joints);
+    let pose = physics_model::world::ToolPose { position_m: tool, orientation: [0.0, 0.0, 0.0, 1.0] };
+    let (object, obstacle) = (&start.state.object, start.state.obstacle.as_ref());
+    let shapes = model.robot().tool_shapes();
+    let mut world = World::restore(&model.config().world, &[], &start.theta, object, obstacle, &pose, shapes);
+    for step in 1..=20 {
+        world.step([tool[0], tool[1] + 0.001 * f64::from(step), tool[2]]);
+    }
+    for (a, b) in [(world.object(), *object), (world.obstacle().unwrap(), *obstacle.unwrap())] {
+        let drift = a.position_m.iter().zip(b.position_m).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
+        assert!(drift < 2e-4, "a simulated resting body settles by {drift} m");
+    }
+}
+
+#[test]
+fn the_heuristic_policy_approaches_the_object() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let mut particle = particle(&model, &joints, 0.1);
+    let mut rng = Seed(1).stream(Purpose::Test, 0);
+    let distance = |p: &Particle| {
+        let tool = model.tool_position_m(&p.state.joints_rad);
+        tool.iter().zip(p.state.object.position_m).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
+    };
+    let mut last = distance(&particle);
+    for _ in 0..8 {
+        let action = HeuristicPolicy.action(&model, &particle, &mut rng);
+        model.act(&mut particle, action, &mut rng);
+        assert!(distance(&particle) < last - 0.015);
+        last = distance(&particle);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Whatever the hypothesis, a step ends: with finite values, or as diverged.
+    #[test]
+    fn no_hypothesis_within_the_ranges_panics(
+        shape in 0..3_usize,
+        obstacle in 0..4_usize,
+        mass in 0.01..20.0_f64,
+        friction in 0.0..1.0_f64,
+        size in prop::array::uniform3(0.01..0.2_f64),
+        offset in prop::array::uniform3(-0.15..0.15_f64),
+        spin in prop::array::uniform3(-20.0..20.0_f64),
+        speed in prop::array::uniform3(-2.0..2.0_f64),
+        yaw in -3.2..3.2_f64,
+        action in 0..10_usize,
+    ) {
+        let (model, joints) = model("sawyer", ObstacleMobility::Movable);
+        let mut p = with_obstacle(particle(&model, &joints, -0.1), 0.0);
+        let values: [f64; 12] = [mass, 0.1 * size[0], 0.0, 0.0, friction, size[0], size[1], size[2], mass, size[1], size[2], size[0]];
+        p.theta = Theta::from_parts(&values, [shape, obstacle]);
+        if p.theta.obstacle.is_none() {
+            p.state.obstacle = None;
+        }
+        let mut body = BodyState::at_rest(p.state.object.position_m, yaw);
+        for axis in 0..3 {
+            body.position_m[axis] += offset[axis];
+        }
+        body.linear_mps = speed;
+        body.angular_rps = spin;
+        p.state.object = body;
+        let before = p.state.object;
+        let (step, _) = model.act(&mut p, Action::ALL[action], &mut Seed(5).stream(Purpose::Test, 0));
+        prop_assert!(step.observation.0.iter().all(|v| v.is_finite()));
+        prop_assert!(p.state.to_vec().iter().all(|v| v.is_finite()));
+        if step.outcome == Outcome::Diverged {
+            prop_assert_eq!(p.state.object, before);
+        }
+    }
+}
