@@ -92,7 +92,7 @@ impl<T: Real> Row<T> {
         // Logits become the responsibilities p(k | targets, classes), then the gradient.
         softmax(&self.joint, logits);
         for (component, logit) in logits.iter_mut().enumerate() {
-            let responsibility = scale * *logit;
+            let responsibility = (scale * *logit).flush();
             *logit = scale * self.share[component] - responsibility;
             let at = component * d..(component + 1) * d;
             let (means, log_stddevs) = (&mut means[at.clone()], &mut log_stddevs[at.clone()]);
@@ -100,16 +100,16 @@ impl<T: Real> Row<T> {
             for index in 0..d {
                 let weight = responsibility * mask[index];
                 let standard = standard[index];
-                means[index] = -(weight * standard * inverse[index]);
+                means[index] = (-(weight * standard * inverse[index])).flush();
                 let raw = log_stddevs[index];
                 let inside = if raw >= low && raw <= high { T::ONE } else { T::ZERO };
-                log_stddevs[index] = weight * (T::ONE - standard * standard) * inside;
+                log_stddevs[index] = (weight * (T::ONE - standard * standard) * inside).flush();
             }
             let mut first = component * labels;
             for (&count, &class) in sizes.classes.iter().zip(classes) {
                 for label in 0..count {
                     let hit = if label == usize::from(class) { T::ONE } else { T::ZERO };
-                    labelled[first + label] = responsibility * (self.classes[first + label] - hit);
+                    labelled[first + label] = (responsibility * (self.classes[first + label] - hit)).flush();
                 }
                 first += count;
             }
@@ -149,7 +149,7 @@ fn softmax<T: Real>(values: &[T], target: &mut [T]) {
         *target = (value - largest).exp();
         total += *target;
     }
-    target.iter_mut().for_each(|value| *value = *value / total);
+    target.iter_mut().for_each(|value| *value = (*value / total).flush());
 }
 
 #[cfg(test)]

@@ -187,14 +187,16 @@ fn deactivate<T: Real>(
             let (i, f, g, o) = (input[unit], forget[unit], candidate[unit], output[unit]);
             let (tanh, up) = (squashed[unit], upstream[unit]);
             let cell = flow[unit] + up * o * (T::ONE - tanh * tanh);
-            output[unit] = up * tanh * o * (T::ONE - o);
-            input[unit] = cell * g * i * (T::ONE - i);
-            candidate[unit] = cell * i * (T::ONE - g * g);
-            forget[unit] = cell * f * (T::ONE - f);
-            flow[unit] = cell * f;
+            output[unit] = (up * tanh * o * (T::ONE - o)).flush();
+            input[unit] = (cell * g * i * (T::ONE - i)).flush();
+            candidate[unit] = (cell * i * (T::ONE - g * g)).flush();
+            forget[unit] = (cell * f * (T::ONE - f)).flush();
+            flow[unit] = (cell * f).flush();
         }
         match past_cell {
-            Some(past) => forget.iter_mut().zip(&past[at]).for_each(|(forget, &past)| *forget = *forget * past),
+            Some(past) => {
+                forget.iter_mut().zip(&past[at]).for_each(|(forget, &past)| *forget = (*forget * past).flush())
+            }
             None => forget.fill(T::ZERO),
         }
     }
