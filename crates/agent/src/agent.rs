@@ -110,8 +110,7 @@ impl<'a> Agent<'a> {
             };
             mind = match mind {
                 Mind::Belief(mut search, particles) => {
-                    let filter = RejectionFilter::new(self.problem.scenario.belief.clone())
-                        .expect("a loaded scenario holds a valid belief configuration");
+                    let filter = RejectionFilter::new(self.problem.scenario.belief.clone())?;
                     match filter.update(model, particles, &record.action, &observation, &proposals, &mut streams.filter)
                     {
                         Ok((particles, report)) => {
@@ -129,7 +128,7 @@ impl<'a> Agent<'a> {
                             reason = Reason::Depleted;
                             break;
                         }
-                        Err(error) => return Err(Error::World(error.to_string())),
+                        Err(error) => return Err(error.into()),
                     }
                 }
                 Mind::Oracle(mut search) => {
@@ -163,7 +162,7 @@ impl<'a> Agent<'a> {
             Method::NoRnn | Method::RnnMax | Method::RnnSampling => {
                 let mut rng = seed.stream(Purpose::InitialBelief, 0);
                 let particles = self.problem.initial_particles(scenario.belief.particles, observation, &mut rng)?;
-                let particles = Particles::uniform(particles).map_err(|error| Error::World(error.to_string()))?;
+                let particles = Particles::uniform(particles)?;
                 Mind::Belief(search()?, particles)
             }
         })
@@ -183,7 +182,7 @@ impl<'a> Agent<'a> {
             Mind::Heuristic => None,
             Mind::Oracle(search) => {
                 let truth = world.truth().ok_or(Error::NoTruth)?.clone();
-                let belief = Particles::uniform(vec![truth]).map_err(|error| Error::World(error.to_string()))?;
+                let belief = Particles::uniform(vec![truth])?;
                 Some(search.search(model, &belief, &HeuristicPolicy, remaining, &mut streams.search))
             }
             Mind::Belief(search, particles) => {

@@ -9,6 +9,9 @@ pub enum Error {
     /// The scenario does not fit.
     #[error(transparent)]
     Scenario(#[from] scenario::Error),
+    /// The filter's settings are impossible.
+    #[error(transparent)]
+    Belief(#[from] belief::Error),
     /// The planner's settings are impossible.
     #[error(transparent)]
     Planner(#[from] planner::Error),

@@ -119,6 +119,10 @@ impl Run {
     /// # Errors
     ///
     /// Where a file cannot be read or written.
+    ///
+    /// # Panics
+    ///
+    /// Never: records and tables are plain data, which has a JSON form.
     pub fn finish(
         &self,
         domain: &str,
@@ -134,7 +138,7 @@ impl Run {
             .map(|record| serde_json::to_string(record).expect("a record is plain data") + "\n")
             .collect();
         write_atomically(&log_file, lines.as_bytes())?;
-        let table = Table::new(domain, robot, preset, &self.provenance, trials.values(), published);
+        let table = Table::new(domain, robot, preset, &self.provenance, &trials, published);
         write_atomically(&self.folder.join("table.json"), pretty(&table).as_bytes())?;
         write_atomically(&self.folder.join("table.md"), table.to_markdown().as_bytes())?;
         write_atomically(&self.folder.join("table.csv"), table.to_csv().as_bytes())?;

@@ -55,16 +55,16 @@ pub struct Table {
 
 impl Table {
     /// Counts the trials of each method, in the order of the run.
-    pub(crate) fn new<'a>(
+    pub(crate) fn new(
         domain: &str,
         robot: &str,
         preset: &str,
         provenance: &Provenance,
-        trials: impl Iterator<Item = &'a TrialRecord> + Clone,
+        trials: &BTreeMap<(Method, u32), TrialRecord>,
         published: &BTreeMap<String, Published>,
     ) -> Self {
         let row = |method: &Method| {
-            let of_method: Vec<&TrialRecord> = trials.clone().filter(|t| t.method == *method).collect();
+            let of_method: Vec<&TrialRecord> = trials.values().filter(|t| t.method == *method).collect();
             let count = |filter: &dyn Fn(&TrialRecord) -> bool| of_method.iter().filter(|t| filter(t)).count() as u32;
             let n = of_method.len() as u32;
             let successes = count(&|t| t.success);

@@ -275,8 +275,8 @@ proptest! {
             p.state.obstacle = None;
         }
         let mut body = BodyState::at_rest(p.state.object.position_m, yaw);
-        for axis in 0..3 {
-            body.position_m[axis] += offset[axis];
+        for (coordinate, shift) in body.position_m.iter_mut().zip(offset) {
+            *coordinate += shift;
         }
         body.linear_mps = speed;
         body.angular_rps = spin;

@@ -195,7 +195,7 @@ fn deactivate<T: Real>(
         }
         match past_cell {
             Some(past) => {
-                forget.iter_mut().zip(&past[at]).for_each(|(forget, &past)| *forget = (*forget * past).flush())
+                forget.iter_mut().zip(&past[at]).for_each(|(forget, &past)| *forget = (*forget * past).flush());
             }
             None => forget.fill(T::ZERO),
         }
