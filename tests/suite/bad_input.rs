@@ -129,3 +129,12 @@ fn programs_outside_the_project_say_so() {
     assert!(stderr(&output).contains("scenarios/base.toml"), "{}", stderr(&output));
     assert!(root().join("scenarios/base.toml").is_file());
 }
+
+#[test]
+fn the_menu_hands_on_arguments_and_exit_codes() {
+    let help = run("xtask", "datagen --help");
+    assert!(help.status.success());
+    assert!(String::from_utf8_lossy(&help.stdout).contains("--transitions"), "the program's own help");
+    refused("xtask", "eval --domain D9", &["unknown domain `D9`"]);
+    assert_eq!(run("xtask", "nonsense").status.code(), Some(2));
+}

@@ -52,6 +52,16 @@ struct Arguments {
     json: bool,
 }
 
+/// What went wrong after the input was found to be good.
+#[derive(Debug)]
+struct Failed;
+
+impl std::fmt::Display for Failed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the run stopped, finished shards are kept")
+    }
+}
+
 fn main() -> ExitCode {
     // Silent unless RUST_LOG asks: results go to files, progress to the bar.
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "off".into());
@@ -65,7 +75,7 @@ fn main() -> ExitCode {
         }
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
 }
@@ -124,17 +134,20 @@ fn run(arguments: &Arguments) -> Result<bool> {
                 let (rows, counts) = generator.shard(first, plan.episodes_per_shard)?;
                 let info = dataset::write_shard(&out, index, &plan.schema, &plan.provenance(), &counts, &rows)?;
                 bar.inc(plan.episodes_per_shard);
+                if bar.is_hidden() {
+                    eprintln!("shard {index}: {} transitions", info.rows - info.episodes);
+                }
                 made.fetch_add(info.rows - info.episodes, Ordering::Relaxed);
                 Ok(())
             })
             .collect()
     });
     bar.finish_and_clear();
-    results.into_iter().collect::<Result<Vec<()>>>()?;
+    results.into_iter().collect::<Result<Vec<()>>>().context(Failed)?;
     if interrupted.load(Ordering::Relaxed) {
         return Ok(false);
     }
-    let manifest = dataset::finish(&out, &plan)?;
+    let manifest = dataset::finish(&out, &plan).context(Failed)?;
     let seconds = started.elapsed().as_secs_f64();
     let rate = made.load(Ordering::Relaxed) as f64 / seconds;
     if arguments.json {
@@ -176,7 +189,7 @@ fn missing_shards(plan: &dataset::Plan, out: &std::path::Path, hash: &str) -> Re
     Ok(missing)
 }
 
-/// A bar with rate and time left on a terminal; nothing elsewhere.
+/// A bar with rate and time left on a terminal; hidden elsewhere, where a line a shard is printed instead.
 fn progress(length: u64, unit: &str) -> ProgressBar {
     let bar = ProgressBar::new(length);
     let template = format!("{{bar:40}} {{pos}}/{{len}} {unit}, {{per_sec}}, {{eta}} left");

@@ -61,6 +61,16 @@ struct Arguments {
     json: bool,
 }
 
+/// What went wrong after the input was found to be good.
+#[derive(Debug)]
+struct Failed;
+
+impl std::fmt::Display for Failed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the run stopped, finished trials are kept")
+    }
+}
+
 fn main() -> ExitCode {
     // Silent unless RUST_LOG asks: results go to files, progress to the bar.
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "off".into());
@@ -74,7 +84,7 @@ fn main() -> ExitCode {
         }
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
 }
@@ -128,11 +138,11 @@ fn run(arguments: &Arguments) -> Result<bool> {
     if run.resumed() > 0 {
         eprintln!("{} trials are finished already", run.resumed());
     }
-    if !play_missing(&run, &problem, prior.as_ref(), arguments)? {
+    if !play_missing(&run, &problem, prior.as_ref(), arguments).context(Failed)? {
         return Ok(false);
     }
     let s = &scenario;
-    let table = run.finish(&s.name, &s.robot.name, &s.preset, &s.evaluation.published)?;
+    let table = run.finish(&s.name, &s.robot.name, &s.preset, &s.evaluation.published).context(Failed)?;
     if arguments.json {
         println!("{}", serde_json::to_string(&table)?);
     } else {

@@ -56,6 +56,16 @@ struct Arguments {
     root: Option<PathBuf>,
 }
 
+/// What went wrong after the input was found to be good.
+#[derive(Debug)]
+struct Failed;
+
+impl std::fmt::Display for Failed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the training stopped, finished epochs are kept")
+    }
+}
+
 fn main() -> ExitCode {
     // Silent unless RUST_LOG asks: results go to files, progress to the bar.
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "off".into());
@@ -69,7 +79,7 @@ fn main() -> ExitCode {
         }
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::from(2)
+            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
 }
@@ -123,11 +133,11 @@ fn run(arguments: &Arguments) -> Result<bool> {
     ]
     .map(|(key, value)| (key.to_string(), value))
     .into();
-    if !train(&mut trainer, &config, &state, &out, &provenance)? {
+    if !train(&mut trainer, &config, &state, &out, &provenance).context(Failed)? {
         return Ok(false);
     }
     let checkpoint = trainer.checkpoint(provenance);
-    checkpoint.save(&out)?;
+    checkpoint.save(&out).context(Failed)?;
     write(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes())?;
     report(&checkpoint, &layout, &config, seed, &recorded, &sequences, &out)?;
     Ok(true)
