@@ -105,8 +105,8 @@ fn a_prior_is_the_same_for_one_thread_and_two_and_after_a_kill() {
 
     let killed = folder.path().join("killed");
     let arguments = train(&trained().data, &killed, 1);
-    // The usable prior appears after the first epoch.
-    let saved = killed.join("prior.json");
+    // The state appears after the first epoch.
+    let saved = killed.join("training/training.json");
     assert!(kill_when("train", &arguments, || saved.exists()), "it ended before it could be killed");
     succeed("train", &arguments);
     assert!(prior_files(&killed) == expected, "a killed and resumed prior differs");

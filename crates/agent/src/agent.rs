@@ -3,7 +3,7 @@
 use belief::{Particles, RejectionFilter};
 use physics_model::{Action, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::Pomcp;
-use pomdp::{Discretise as _, Outcome, Purpose, Rng, Seed, Updater as _, discounted_return};
+use pomdp::{Discretise as _, Prior as _, Outcome, Purpose, Rng, Seed, Updater as _, discounted_return};
 use prior::Suggester;
 use scenario::Problem;
 
@@ -11,9 +11,6 @@ use crate::{Episode, Error, Method, Reason, StepRecord, World};
 
 /// Attempts at drawing one possible suggestion.
 const DRAWS_PER_PROPOSAL: usize = 10;
-/// Beyond the threshold of the reward, the measured object must have moved by this many standard deviations of its position: two
-/// measurements of a resting object differ by less in all but one step in a thousand.
-const MOVED_STDDEVS: f64 = 6.0;
 
 /// Plays episodes of a problem with one method.
 #[derive(Debug)]
@@ -70,12 +67,9 @@ impl<'a> Agent<'a> {
         let (mut observation, mut joints_rad) = world.reset()?;
         if let Some(prior) = &mut self.prior {
             prior.reset();
-            prior.observe(&observation);
+            prior.suggest(None, &observation);
         }
         let mut mind = self.first_mind(&observation, seed)?;
-        let first_observation = observation.clone();
-        let moved_m = self.problem.scenario.task.reward.moved_threshold_m
-            + MOVED_STDDEVS * self.problem.scenario.sensor.noise.position_m;
         let mut object_moved = false;
         let mut steps: Vec<StepRecord> = Vec::new();
         let mut depletions = 0;
@@ -83,7 +77,8 @@ impl<'a> Agent<'a> {
         for time in 0..horizon {
             let mut record = self.decide(&mut mind, world, &observation, &joints_rad, horizon - time, &mut streams)?;
             let answer = world.act(record.action)?;
-            object_moved |= displacement_m(&first_observation, &answer.observation) > moved_m;
+            // Only moving the object (or reaching the goal, which ends the episode) pays more than a plain step.
+            object_moved |= answer.reward > self.problem.scenario.task.reward.step;
             record.observation = answer.observation.clone();
             record.reward = answer.reward;
             record.large_force = answer.report.events.large_force;
@@ -101,7 +96,7 @@ impl<'a> Agent<'a> {
             }
             let proposals = match &mut self.prior {
                 Some(prior) => {
-                    prior.observe(&observation);
+                    prior.suggest(Some(&record.action), &observation);
                     let context = Context { model, observation: &observation, joints_rad: &joints_rad, object_moved };
                     let count = self.problem.scenario.agent.proposals;
                     suggest(prior, self.method, &context, count, &mut streams.suggestion)
@@ -119,7 +114,7 @@ impl<'a> Agent<'a> {
                             record.update = Some(report);
                             record.obstacle_share = Some(obstacle_share(&particles));
                             search.prune(&record.action, &model.key(&observation));
-                            Mind::Belief(search, particles)
+                            Mind::Belief(search, with_joints(particles, &joints_rad)?)
                         }
                         Err(belief::Error::Depleted { attempts, .. }) => {
                             depletions += 1;
@@ -189,6 +184,7 @@ impl<'a> Agent<'a> {
                 Some(search.search(model, particles, &HeuristicPolicy, remaining, &mut streams.search))
             }
         };
+        let reused = searched.as_ref().map_or(0, |report| report.reused);
         let (action, value, simulations, transitions) = match searched {
             Some(report) => {
                 let value = report.actions[report.action.index()].value;
@@ -202,6 +198,7 @@ impl<'a> Agent<'a> {
             reward: 0.0,
             value,
             simulations,
+            reused,
             transitions,
             update: None,
             obstacle_share: None,
@@ -248,13 +245,17 @@ fn suggest(prior: &Suggester, method: Method, context: &Context<'_>, count: usiz
     particles
 }
 
+/// The arm's own joint positions are known: particles whose simulated move ended elsewhere (stopped by a contact) take them over.
+fn with_joints(particles: Particles<Particle>, joints_rad: &[f64]) -> Result<Particles<Particle>, Error> {
+    let weights: Vec<f64> = particles.iter().map(|(_, weight)| weight).collect();
+    let mut states = particles.into_states();
+    for particle in &mut states {
+        particle.state.joints_rad.copy_from_slice(joints_rad);
+    }
+    Ok(Particles::weighted(states, weights)?)
+}
+
 fn obstacle_share(particles: &Particles<Particle>) -> f64 {
     let with = particles.iter().filter(|(particle, _)| particle.theta.obstacle.is_some());
     with.map(|(_, weight)| weight).sum()
-}
-
-/// How far the measured object is from where it was measured before, m.
-fn displacement_m(before: &Observation, after: &Observation) -> f64 {
-    let (a, b) = (before.object_pose().0, after.object_pose().0);
-    a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
 }

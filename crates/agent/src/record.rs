@@ -31,6 +31,8 @@ pub struct StepRecord {
     pub value: Option<f64>,
     /// Simulations of the search.
     pub simulations: usize,
+    /// Simulations of earlier searches that the pruned tree brought along.
+    pub reused: u64,
     /// Transitions simulated for the decision and the belief update.
     pub transitions: usize,
     /// Belief update; `None` where there was none (last step, no belief).

@@ -20,7 +20,7 @@ pub struct WorldStep {
     pub report: ActionReport,
 }
 
-/// A world that can be acted on: simulated here; replayed logs and external processes stand behind the same trait.
+/// A world that can be acted on. The one here is simulated; whatever else can answer to an action may stand behind this trait.
 pub trait World {
     /// Begins the episode; returns the first observation and the joint positions, rad.
     ///

@@ -106,6 +106,8 @@ fn run(arguments: &Arguments) -> Result<bool> {
         .clone()
         .unwrap_or_else(|| root.join(if arguments.quick { "runs/quick/data" } else { "runs/data" }).join(&robot));
     let plan = datagen::plan(&scenario, scenario::commit(&root), transitions, arguments.seed, arguments.shards);
+    // Before anything is written: a faulty arm must not leave a plan behind.
+    let generator = datagen::Generator::new(&scenario, &root, arguments.seed)?;
     plan.open(&out)?;
     let hash = plan.hash();
     let missing = missing_shards(&plan, &out, &hash)?;
@@ -117,7 +119,6 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
 
-    let generator = datagen::Generator::new(&scenario, &root, arguments.seed)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build()?;
     let bar = progress(missing.len() as u64 * plan.episodes_per_shard, "episodes");
     #[expect(clippy::disallowed_methods, reason = "a program may measure its rate")]

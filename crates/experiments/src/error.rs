@@ -20,6 +20,14 @@ pub enum Error {
         /// Its value here.
         expected: String,
     },
+    /// Files that no run of ours has left there.
+    #[error("{file}: is there without a {expected} beside it: choose another --out or remove it")]
+    Foreign {
+        /// What is there.
+        file: PathBuf,
+        /// What would say where it comes from.
+        expected: &'static str,
+    },
     /// A file that cannot be read or written.
     #[error("{file}: {action} failed")]
     File {

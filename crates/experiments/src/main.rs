@@ -124,11 +124,12 @@ fn run(arguments: &Arguments) -> Result<bool> {
             scenario_hash: scenario.hash(),
             seed: arguments.seed,
             prior_hash: prior.as_ref().map(|p| p.hash().to_string()),
-            methods,
-            trials: scenario.evaluation.trials,
+            urdf_hash: scenario.urdf_hash(&root)?,
+            commit: scenario::commit(&root),
         },
         program: format!("eval {}", env!("CARGO_PKG_VERSION")),
-        commit: scenario::commit(&root),
+        methods,
+        trials: scenario.evaluation.trials,
     };
     let out = arguments.out.clone().unwrap_or_else(|| {
         let name = format!("{}-{}-{}", scenario.name, scenario.robot.name, scenario.preset);

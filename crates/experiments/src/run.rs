@@ -23,10 +23,10 @@ pub struct RunIdentity {
     pub seed: u64,
     /// Hash of the prior's weights; `None` where no method needs one.
     pub prior_hash: Option<String>,
-    /// Methods, in the order of the table.
-    pub methods: Vec<Method>,
-    /// Trials a method.
-    pub trials: u32,
+    /// Hash of the arm's URDF file.
+    pub urdf_hash: String,
+    /// Commit of the checkout that the program runs in.
+    pub commit: String,
 }
 
 /// Where results come from: the identity of the run and of the program.
@@ -37,8 +37,10 @@ pub struct Provenance {
     pub run: RunIdentity,
     /// Version of the program.
     pub program: String,
-    /// Commit that it was built from.
-    pub commit: String,
+    /// Methods, in the order of the table.
+    pub methods: Vec<Method>,
+    /// Trials a method.
+    pub trials: u32,
 }
 
 /// A run directory.
@@ -66,6 +68,10 @@ impl Run {
         match std::fs::read_to_string(&identity_file) {
             Ok(text) => check_identity(&identity_file, &text, &provenance.run)?,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                let ours = ["scenario.toml", "trials.jsonl", "table.json", "table.md", "table.csv"];
+                if let Some(file) = ours.iter().map(|name| folder.join(name)).find(|file| file.exists()) {
+                    return Err(Error::Foreign { file, expected: "run.json" });
+                }
                 write_atomically(&folder.join("scenario.toml"), scenario_toml.as_bytes())?;
                 write_atomically(&identity_file, pretty(&provenance.run).as_bytes())?;
             }
@@ -81,9 +87,9 @@ impl Run {
     /// Trials that are still to be played, methods in turn for each trial.
     #[must_use]
     pub fn missing(&self) -> Vec<(Method, u32)> {
-        let identity = &self.provenance.run;
-        (0..identity.trials)
-            .flat_map(|trial| identity.methods.iter().map(move |method| (*method, trial)))
+        let p = &self.provenance;
+        (0..p.trials)
+            .flat_map(|trial| p.methods.iter().map(move |method| (*method, trial)))
             .filter(|item| !self.finished.contains_key(item))
             .collect()
     }
@@ -196,7 +202,11 @@ fn read_trials(file: &Path) -> Result<BTreeMap<(Method, u32), TrialRecord>, Erro
 fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let error = |source| Error::File { file: path.to_path_buf(), action: "writing", source };
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(error)?;
+    let mut builder = tempfile::Builder::new();
+    // Temporary files are private by default; results are as readable as the user's other files.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(error)?;
     file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(error)?;
     file.persist(path).map_err(|e| error(e.error))?;
     Ok(())
@@ -215,11 +225,12 @@ mod tests {
                 scenario_hash: "abc".into(),
                 seed,
                 prior_hash: None,
-                methods: vec![Method::NoRnn, Method::Heuristic],
-                trials: 3,
+                urdf_hash: "def".into(),
+                commit: "none".into(),
             },
             program: "test".into(),
-            commit: "none".into(),
+            methods: vec![Method::NoRnn, Method::Heuristic],
+            trials: 3,
         }
     }
 
@@ -287,6 +298,28 @@ mod tests {
         let message = Run::open(folder.path(), provenance(2), "second").unwrap_err().to_string();
         assert!(message.contains("run.json") && message.contains("`seed` is 1, this run has 2"), "{message}");
         assert_eq!(std::fs::read_to_string(folder.path().join("scenario.toml")).unwrap(), "first");
+    }
+
+    #[test]
+    fn more_trials_go_on_where_fewer_ended() {
+        let folder = tempfile::tempdir().unwrap();
+        let few = Provenance { trials: 1, ..provenance(1) };
+        let run = Run::open(folder.path(), few, "").unwrap();
+        for (method, trial) in run.missing() {
+            run.keep(&record(method, trial, true)).unwrap();
+        }
+        assert_eq!(finish(&run).rows[0].trials, 1);
+        let run = Run::open(folder.path(), provenance(1), "").unwrap();
+        assert_eq!((run.resumed(), run.missing().len()), (2, 4));
+    }
+
+    #[test]
+    fn a_folder_with_files_of_unknown_origin_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("table.md"), "mine").unwrap();
+        let message = Run::open(folder.path(), provenance(1), "").unwrap_err().to_string();
+        assert!(message.contains("table.md") && message.contains("run.json"), "{message}");
+        assert_eq!(std::fs::read_to_string(folder.path().join("table.md")).unwrap(), "mine");
     }
 
     #[test]

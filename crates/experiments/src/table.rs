@@ -64,7 +64,7 @@ impl Table {
         published: &BTreeMap<String, Published>,
     ) -> Self {
         let row = |method: &Method| {
-            let of_method: Vec<&TrialRecord> = trials.values().filter(|t| t.method == *method).collect();
+            let of_method: Vec<&TrialRecord> = trials.values().filter(|t| t.method == *method && t.trial < provenance.trials).collect();
             let count = |filter: &dyn Fn(&TrialRecord) -> bool| of_method.iter().filter(|t| filter(t)).count() as u32;
             let n = of_method.len() as u32;
             let successes = count(&|t| t.success);
@@ -96,7 +96,7 @@ impl Table {
                 obstacle_touched: count(&|t| t.obstacle_touched),
             }
         };
-        Self { rows: provenance.run.methods.iter().map(row).collect(), provenance: provenance.clone() }
+        Self { rows: provenance.methods.iter().map(row).collect(), provenance: provenance.clone() }
     }
 
     /// For people.

@@ -18,6 +18,9 @@ use crate::state::State;
 use crate::theta::Theta;
 use crate::world::{ToolPose, World, Wrench, check_overlaps, check_theta, nothing_happens};
 
+/// Attempts at moving a hypothesis to a possible one.
+const PERTURB_DRAWS: usize = 5;
+
 /// One hypothesis: state and parameters, with what of the past the rewards and the sensors need.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -345,6 +348,14 @@ impl Discretise for PushModel {
 
 impl Perturb for PushModel {
     fn perturb(&self, particle: &mut Particle, rng: &mut Rng) {
-        perturb::perturb(&self.config.perturb, self.config.world.table_height_m, particle, rng);
+        // Noise may push bodies into one another; such a hypothesis is drawn again, and stays as it was where none is possible.
+        for _ in 0..PERTURB_DRAWS {
+            let mut moved = particle.clone();
+            perturb::perturb(&self.config.perturb, self.config.world.table_height_m, &mut moved, rng);
+            if self.check(&moved).is_ok() {
+                *particle = moved;
+                return;
+            }
+        }
     }
 }

@@ -10,6 +10,9 @@ use crate::model::{Particle, PushModel};
 use crate::state::{BodyState, State};
 use crate::theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta};
 
+/// Drawn masses are kept in these ranges, kg: a Gamma distribution has no largest value, and the solver no use for a gram.
+const OBJECT_MASS_KG: [f64; 2] = [0.02, 20.0];
+const OBSTACLE_MASS_KG: [f64; 2] = [0.02, 200.0];
 /// Draws of one world that may fail the checks before the distribution is called impossible.
 const MOST_DRAWS: usize = 1000;
 
@@ -191,6 +194,10 @@ impl WorldDistribution {
             .or_else(|| named("object.mass_kg", o.mass_kg.problem()))
             .or_else(|| named("obstacle.mass_kg", b.mass_kg.problem()))
             .or_else(|| {
+                let heavy = o.mass_kg.mean > OBJECT_MASS_KG[1] / 2.0 || b.mass_kg.mean > OBSTACLE_MASS_KG[1] / 2.0;
+                heavy.then(|| "mass_kg.mean: expected at most 10 kg for the object and 100 kg for the obstacle".into())
+            })
+            .or_else(|| {
                 let size_low = o.size_m.parts().chain(b.size_m.parts()).any(|d| d.low <= 0.0);
                 size_low.then(|| "size_m: expected sizes above 0".into())
             })
@@ -206,7 +213,7 @@ impl WorldDistribution {
         let d = &self.object;
         let shape = ObjectShape::ALL[categorical(&d.shape, rng)];
         let size_m = d.size_m.sample(shape, rng);
-        let mass_kg = d.mass_kg.sample(rng).clamp(0.02, 20.0);
+        let mass_kg = d.mass_kg.sample(rng).clamp(OBJECT_MASS_KG[0], OBJECT_MASS_KG[1]);
         let com: [f64; 3] = std::array::from_fn(|axis| d.com_m[axis].sample(rng));
         let extent = match shape {
             ObjectShape::Box => size_m,
@@ -222,7 +229,7 @@ impl WorldDistribution {
         let class = categorical(&b.shape, rng);
         let obstacle = ObjectShape::ALL.get(class).map(|&shape| {
             let size_m = b.size_m.sample(shape, rng);
-            let mass_kg = b.mass_kg.sample(rng).clamp(0.02, 200.0);
+            let mass_kg = b.mass_kg.sample(rng).clamp(OBSTACLE_MASS_KG[0], OBSTACLE_MASS_KG[1]);
             let position = [b.x_m.sample(rng), b.y_m.sample(rng), table_height_m + shape.half_height_m(size_m)];
             (ObstacleTheta { shape, mass_kg, size_m }, BodyState::at_rest(position, b.yaw_rad.sample(rng)))
         });

@@ -188,12 +188,16 @@ impl SensorConfig {
     }
 }
 
-/// Index 0 to 255 of `value`, clipped to ±`range`.
+/// Index 0 to 255 of `value`, clipped to ±`range`: ⌊255 (value + range) / (2 range)⌋.
+///
+/// The paper says "clipped and mapped to indices 0 to N" and leaves the rounding open. Rounding to the nearest would put an edge at exactly
+/// 0, where every force without contact and every roll and pitch of a standing object lie: sensor noise would then toss a coin for each
+/// of them. Rounding down puts 0 into the middle of class 127.
 #[must_use]
 fn discretise(value: f64, range: f64) -> u8 {
     let share = (value.clamp(-range, range) + range) / (2.0 * range);
     // NaN becomes 0 by Rust's casting rule; diverged worlds never get here with one.
-    (share * BINS).round() as u8
+    (share * BINS).floor() as u8
 }
 
 fn unit([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
@@ -235,10 +239,10 @@ mod tests {
         assert_eq!(discretise(-10.0, 10.0), 0);
         assert_eq!(discretise(10.0, 10.0), 255);
         assert_eq!(discretise(1e9, 10.0), 255);
-        assert_eq!(discretise(0.0, 500.0), 128);
-        // One step is 20/255 m.
-        assert_eq!(discretise(0.0393, 10.0), discretise(0.0, 10.0));
-        assert_eq!(discretise(0.0785, 10.0), 129);
+        assert_eq!(discretise(0.0, 500.0), 127);
+        // One step is 20/255 m, and 0 lies in the middle of one.
+        assert_eq!([discretise(-0.039, 10.0), discretise(0.039, 10.0)], [127, 127]);
+        assert_eq!([discretise(-0.04, 10.0), discretise(0.04, 10.0)], [126, 128]);
     }
 
     #[test]
@@ -258,7 +262,7 @@ mod tests {
         values[7] = 500.0;
         values[13] = -10.0;
         values[19] = 1.0;
-        assert_eq!(wrist.key(&Observation(values), 7).0, [255, 128, 128, 0, 128, 128, 0, 0, 0]);
+        assert_eq!(wrist.key(&Observation(values), 7).0, [255, 127, 127, 0, 127, 127, 0, 0, 0]);
         let torques = sensor(ForceSensing::JointTorques);
         let mut values = vec![0.0; 13];
         values[3] = 160.0;
@@ -266,8 +270,25 @@ mod tests {
         values[11] = 1.0; // z: half a turn of yaw.
         values[12] = 0.0;
         let key = torques.key(&Observation(values), 6).0;
-        assert_eq!(key[..6], [255, 128, 0, 128, 128, 128]);
+        assert_eq!(key[..6], [255, 127, 0, 127, 127, 127]);
         assert_eq!(key[8], 191, "yaw of π on ±2π is three quarters of the way");
+    }
+
+    #[test]
+    fn noise_leaves_an_untouched_arm_in_its_class() {
+        for (sensing, joints) in [(ForceSensing::Wrist, 7), (ForceSensing::JointTorques, 6)] {
+            let sensor = sensor(sensing);
+            let mut quiet = readings(joints);
+            // Mid-bin positions and torques: what is tested is that zero forces, roll and pitch are not at an edge.
+            quiet.force = [0.0; 6];
+            quiet.object = BodyState::at_rest([0.0, 0.0, 0.0], 0.0);
+            let expected = sensor.key(&sensor.noise_free(&quiet), joints);
+            let mut rng = Seed(4).stream(Purpose::Test, 0);
+            let same = (0..1000).filter(|_| sensor.key(&sensor.observe(&quiet, &mut rng), joints) == expected).count();
+            // Half a class of angle is 2.46 standard deviations of the orientation noise: 0.986³ = 0.958 for the Jaco's three angles. At
+            // an edge it would be an eighth.
+            assert!(same >= 930, "{same} of 1000 for {sensing:?}");
+        }
     }
 
     #[test]

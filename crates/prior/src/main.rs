@@ -31,8 +31,8 @@ struct Arguments {
     #[arg(long)]
     out: Option<PathBuf>,
     /// Most epochs [default: 150, 10 with --quick].
-    #[arg(long)]
-    epochs: Option<usize>,
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    epochs: Option<u32>,
     /// Stops after this many epochs without a better held-out likelihood.
     #[arg(long, default_value_t = 15)]
     patience: usize,
@@ -114,7 +114,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
         batch: 128,
         chunks: 4,
         held_out: 0.1,
-        max_epochs: arguments.epochs.unwrap_or(if arguments.quick { 10 } else { 150 }),
+        max_epochs: arguments.epochs.unwrap_or(if arguments.quick { 10 } else { 150 }) as usize,
         patience: arguments.patience,
         clip_norm: Some(10.0),
         weight_decay: 0.0,
@@ -123,7 +123,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     };
     let seed = Seed(arguments.seed);
     let state = out.join("training");
-    let mut trainer = open_trainer(&state, arguments.resume, &layout, &config, &sequences, seed)?;
+    let mut trainer = open_trainer(&out, &state, arguments.resume, &layout, &config, &sequences, seed)?;
     let provenance: BTreeMap<String, String> = [
         ("dataset_plan_hash", manifest.plan_hash.clone()),
         ("dataset_seed", manifest.seed.to_string()),
@@ -133,7 +133,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     ]
     .map(|(key, value)| (key.to_string(), value))
     .into();
-    if !train(&mut trainer, &config, &state, &out, &provenance).context(Failed)? {
+    if !train(&mut trainer, &config, &state).context(Failed)? {
         return Ok(false);
     }
     let checkpoint = trainer.checkpoint(provenance);
@@ -145,6 +145,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
 
 /// Goes on with the training in `state` where there is one of the same settings, else begins.
 fn open_trainer(
+    out: &Path,
     state: &Path,
     insist: bool,
     layout: &Layout,
@@ -155,6 +156,10 @@ fn open_trainer(
     if !state.is_dir() {
         if insist {
             return Err(anyhow!("{}: --resume expected an interrupted training, found none", state.display()));
+        }
+        if let Some(file) = ["prior.json", "curve.csv", "calibration.json"].map(|name| out.join(name)).iter().find(|f| f.exists()) {
+            let state = state.display();
+            return Err(anyhow!("{}: is there without {state} beside it: choose another --out or remove it", file.display()));
         }
         return Ok(Trainer::new(config.clone(), layout.clone(), sequences, seed)?);
     }
@@ -178,8 +183,6 @@ fn train(
     trainer: &mut Trainer,
     config: &TrainConfig,
     state: &Path,
-    out: &Path,
-    provenance: &BTreeMap<String, String>,
 ) -> Result<bool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
@@ -196,10 +199,6 @@ fn train(
         let started = std::time::Instant::now();
         let epoch = trainer.epoch()?;
         trainer.save(state)?;
-        if epoch.best_epoch == epoch.epoch {
-            // A prior that can be used is there from the first epoch on.
-            trainer.checkpoint(provenance.clone()).save(out)?;
-        }
         bar.inc(1);
         let line = format!(
             "epoch {}: training {:.3}, held out {:.3} nats, best {:.3} at {}, {:.1} s",
@@ -257,8 +256,10 @@ fn project_root(start: &Path) -> PathBuf {
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut file =
-        tempfile::NamedTempFile::new_in(folder).with_context(|| format!("{}: cannot write", folder.display()))?;
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).with_context(|| format!("{}: cannot write", folder.display()))?;
     file.write_all(bytes)?;
     file.as_file().sync_all()?;
     file.persist(path).with_context(|| format!("{}: cannot write", path.display()))?;

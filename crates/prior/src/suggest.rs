@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use physics_model::{Observation, Particle, PushModel};
-use pomdp::Rng;
+use physics_model::{Action, Observation, Particle, PushModel};
+use pomdp::{Prior, Rng};
 
 use crate::checkpoint::Checkpoint;
 use crate::mixture::Mixture;
@@ -36,17 +36,6 @@ impl Suggester {
         &self.hash
     }
 
-    /// Forgets the episode.
-    pub fn reset(&mut self) {
-        self.inference.reset();
-        self.latest = None;
-    }
-
-    /// Takes in the next observation of the episode.
-    pub fn observe(&mut self, observation: &Observation) {
-        self.latest = Some(self.inference.step(&observation.0).clone());
-    }
-
     /// The mixture after the latest observation; `None` before the first.
     #[must_use]
     pub fn mixture(&self) -> Option<&Mixture> {
@@ -64,5 +53,21 @@ impl Suggester {
     pub fn strongest(&self, table_height_m: f64) -> Option<Particle> {
         let draw = self.latest.as_ref()?.strongest();
         Some(features::particle(&draw, self.joints, table_height_m))
+    }
+}
+
+impl Prior<Action, Observation> for Suggester {
+    type Suggestion = Mixture;
+
+    fn reset(&mut self) {
+        self.inference.reset();
+        self.latest = None;
+    }
+
+    /// The published network takes in observations alone.
+    fn suggest(&mut self, _action: Option<&Action>, observation: &Observation) -> Mixture {
+        let mixture = self.inference.step(&observation.0).clone();
+        self.latest = Some(mixture.clone());
+        mixture
     }
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use physics_model::config::ForceSensing;
 use physics_model::robot::Robot;
 use physics_model::{Observation, Particle, PushModel, WorldDistribution};
 use pomdp::Rng;
@@ -35,6 +36,14 @@ impl Problem {
     /// A missing or faulty URDF; a start that the arm cannot take.
     pub fn assemble(scenario: &Scenario, root: &Path) -> Result<Self, Error> {
         let robot = Arc::new(Robot::load(&scenario.robot, root)?);
+        let (joints, sensing) = (robot.joint_count(), scenario.sensor.force);
+        // The key of the search tree takes the three distal torques, the readings hold six values.
+        if sensing == ForceSensing::JointTorques && !(3..=6).contains(&joints) {
+            return Err(Error::Task {
+                name: scenario.name.clone(),
+                problem: format!("sensor.force: joint_torques expects an arm of 3 to 6 joints, this one has {joints}"),
+            });
+        }
         let truth = PushModel::new(scenario.push_config(&scenario.effects.truth), Arc::clone(&robot));
         let model = PushModel::new(scenario.push_config(&scenario.effects.model), robot);
         let start = scenario.task.tool_start_m;

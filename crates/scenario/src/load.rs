@@ -1,4 +1,5 @@
-//! Layers of TOML, later values winning: base, robot, preset, quick, domain, `--set`.
+//! Layers of TOML, later values winning: base, robot, preset, domain, quick, `--set`. A resolved scenario is a layer that holds everything: it
+//! replaces all before it.
 
 use std::path::{Path, PathBuf};
 
@@ -45,18 +46,19 @@ impl Selection {
     /// [`Error`] with file, key and expectation.
     pub fn load(&self) -> Result<Scenario, Error> {
         let scenarios = self.root.join("scenarios");
-        let mut paths = vec![
+        let paths = [
             scenarios.join("base.toml"),
             locate("robot", &self.robot, &scenarios.join("robots"))?,
             locate("preset", &self.preset, &scenarios.join("presets"))?,
+            locate("domain", &self.domain, &scenarios)?,
         ];
-        if self.quick {
-            paths.push(scenarios.join("presets/quick.toml"));
-        }
-        paths.push(locate("domain", &self.domain, &scenarios)?);
+        let quick = self.quick.then(|| scenarios.join("presets/quick.toml"));
         let mut layers = Vec::new();
-        for path in paths {
+        for path in paths.into_iter().chain(quick) {
             let table = read(&path)?;
+            if RESOLVED_KEYS.iter().all(|key| table.contains_key(*key)) {
+                layers.clear();
+            }
             layers.push(Layer { name: path.display().to_string(), table });
         }
         for text in &self.set {
@@ -91,6 +93,9 @@ impl Selection {
         }
     }
 }
+
+/// A file with these keys is a resolved scenario, not a layer.
+const RESOLVED_KEYS: [&str; 4] = ["name", "preset", "robot", "version"];
 
 struct Layer {
     name: String,
@@ -236,6 +241,8 @@ mod tests {
     fn a_resolved_scenario_loads_again_to_the_same_values() {
         let scenario = load(|s| {
             s.domain = "D4".into();
+            // Not the arm that is laid under it when it is loaded again.
+            s.robot = "jaco".into();
             s.set = vec!["planner.depth=7".into(), "planner.budget={ simulations = 9 }".into()];
         })
         .unwrap();

@@ -1,12 +1,15 @@
 //! The resolved scenario: every key of a run, none with a hidden default.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use physics_model::WorldDistribution;
 use physics_model::config::{ObstacleMobility, PerturbConfig, PushConfig, SensorConfig, TaskConfig, WorldConfig};
 use physics_model::effect::EffectConfig;
 use physics_model::robot::RobotConfig;
 use serde::{Deserialize, Serialize};
+
+use crate::Error;
 
 /// Version of the scenario format that this crate reads and writes.
 pub const VERSION: u32 = 1;
@@ -91,7 +94,7 @@ pub struct AgentConfig {
 pub struct DataConfig {
     /// Share of the episodes in which the obstacle can move.
     pub movable_share: f64,
-    /// Actions in an episode; fewer where the goal is reached.
+    /// Actions in an episode; fewer where the world diverges. Reaching the goal does not end it.
     pub episode_actions: usize,
     /// Share of uniformly random actions.
     pub exploration_share: f64,
@@ -141,10 +144,23 @@ impl Scenario {
         toml::to_string(self).expect("a scenario holds only what TOML can express")
     }
 
-    /// Hash of the resolved scenario.
+    /// Hash of the resolved scenario without its `evaluation`, which does not change what happens in a trial.
     #[must_use]
     pub fn hash(&self) -> String {
-        blake3::hash(self.to_toml().as_bytes()).to_hex().to_string()
+        let evaluation = EvaluationConfig { trials: 1, published: BTreeMap::new() };
+        let decisive = Self { evaluation, ..self.clone() };
+        blake3::hash(decisive.to_toml().as_bytes()).to_hex().to_string()
+    }
+
+    /// Hash of the arm's URDF file, below `root`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Read`] where it cannot be read.
+    pub fn urdf_hash(&self, root: &Path) -> Result<String, Error> {
+        let file = root.join(&self.robot.urdf);
+        let bytes = std::fs::read(&file).map_err(|source| Error::Read { file, source })?;
+        Ok(blake3::hash(&bytes).to_hex().to_string())
     }
 
     /// The scenario with another mobility of the obstacle.

@@ -18,7 +18,9 @@ impl Effect for TableTilt {
     fn gravity(&self, gravity_mps2: &mut [f64; 3]) {
         let g = gravity_mps2.iter().map(|v| v * v).sum::<f64>().sqrt();
         let (sx, sy) = (self.slope_x_rad.sin(), self.slope_y_rad.sin());
-        *gravity_mps2 = [g * sx, g * sy, -g * (1.0 - sx * sx - sy * sy).max(0.0).sqrt()];
+        // Added to what is there, so that two tilts make one steeper.
+        let (x, y) = (gravity_mps2[0] + g * sx, gravity_mps2[1] + g * sy);
+        *gravity_mps2 = [x, y, -(g * g - x * x - y * y).max(0.0).sqrt()];
     }
 }
 
