@@ -64,7 +64,8 @@ impl Table {
         published: &BTreeMap<String, Published>,
     ) -> Self {
         let row = |method: &Method| {
-            let of_method: Vec<&TrialRecord> = trials.values().filter(|t| t.method == *method && t.trial < provenance.trials).collect();
+            let of_method: Vec<&TrialRecord> =
+                trials.values().filter(|t| t.method == *method && t.trial < provenance.trials).collect();
             let count = |filter: &dyn Fn(&TrialRecord) -> bool| of_method.iter().filter(|t| filter(t)).count() as u32;
             let n = of_method.len() as u32;
             let successes = count(&|t| t.success);

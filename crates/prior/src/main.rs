@@ -157,9 +157,14 @@ fn open_trainer(
         if insist {
             return Err(anyhow!("{}: --resume expected an interrupted training, found none", state.display()));
         }
-        if let Some(file) = ["prior.json", "curve.csv", "calibration.json"].map(|name| out.join(name)).iter().find(|f| f.exists()) {
+        if let Some(file) =
+            ["prior.json", "curve.csv", "calibration.json"].map(|name| out.join(name)).iter().find(|f| f.exists())
+        {
             let state = state.display();
-            return Err(anyhow!("{}: is there without {state} beside it: choose another --out or remove it", file.display()));
+            return Err(anyhow!(
+                "{}: is there without {state} beside it: choose another --out or remove it",
+                file.display()
+            ));
         }
         return Ok(Trainer::new(config.clone(), layout.clone(), sequences, seed)?);
     }
@@ -179,11 +184,7 @@ fn open_trainer(
 }
 
 /// Epochs until the end; false where interrupted.
-fn train(
-    trainer: &mut Trainer,
-    config: &TrainConfig,
-    state: &Path,
-) -> Result<bool> {
+fn train(trainer: &mut Trainer, config: &TrainConfig, state: &Path) -> Result<bool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
