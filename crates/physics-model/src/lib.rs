@@ -11,6 +11,7 @@ pub mod config;
 pub mod effect;
 pub mod effects;
 pub mod error;
+pub mod feasible;
 pub mod heuristic;
 pub mod model;
 mod perturb;

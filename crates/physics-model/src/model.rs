@@ -10,13 +10,14 @@ use crate::action::{Action, minimum_jerk};
 use crate::config::{ForceSensing, PushConfig};
 use crate::effect::{Effect, EffectConfig};
 use crate::error::Impossible;
+use crate::feasible::{check_overlaps, check_theta, nothing_happens};
 use crate::perturb;
 use crate::reward::Events;
 use crate::robot::Robot;
 use crate::sensor::{Observation, ObservationKey, Readings};
 use crate::state::State;
 use crate::theta::Theta;
-use crate::world::{ToolPose, World, Wrench, check_overlaps, check_theta, nothing_happens};
+use crate::world::{ToolPose, World, Wrench};
 
 /// Attempts at moving a hypothesis to a possible one.
 const PERTURB_DRAWS: usize = 5;

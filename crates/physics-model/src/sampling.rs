@@ -258,7 +258,7 @@ impl WorldDistribution {
 /// allowance first.
 fn separate(model: &PushModel, particle: &Particle) -> bool {
     let mut grown = particle.clone();
-    let margin = 2.0 * crate::world::OVERLAP_LIMIT_M;
+    let margin = 2.0 * crate::feasible::OVERLAP_LIMIT_M;
     let grow = |shape: ObjectShape, size_m: &mut [f64; 3]| match shape {
         ObjectShape::Box => {
             size_m[0] += margin;

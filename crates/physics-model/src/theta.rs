@@ -178,7 +178,7 @@ impl Theta {
     }
 
     /// Θ from continuous values (order of [`THETA_NAMES`]) and class indices. Values that do not apply to the classes are
-    /// set to 0; no range is checked here: see [`crate::world::World::restore`].
+    /// set to 0; no range is checked here: see [`crate::feasible::check_theta`].
     ///
     /// # Panics
     ///

@@ -13,26 +13,14 @@ use rapier3d::prelude::{
 
 use crate::config::{ObstacleMobility, WorldConfig};
 use crate::effect::{BodyView, Effect, Load, Surroundings};
-use crate::error::Impossible;
 use crate::robot::ToolShape;
 use crate::state::BodyState;
 use crate::theta::{ObjectShape, Theta};
 
-/// Deepest overlap, m, at which two bodies may be restored: what soft contacts reach in a hard push, and no more.
-pub const OVERLAP_LIMIT_M: f64 = 0.006;
 /// Fastest body, m/s, that a push of 0.1 m/s can plausibly cause.
 const SPEED_LIMIT_MPS: f64 = 5.0;
 /// Height over the table, m, below which a body's centre has sunk into it.
 const SUNK_LIMIT_M: f64 = 0.004;
-
-/// Slower than this a body is at rest: friction stops it within a micrometre.
-const RESTING_SPEED_MPS: f64 = 0.002;
-const RESTING_SPIN_RPS: f64 = 0.02;
-/// Height over the resting height, m, and squared x–y part of the quaternion (2° of tilt) of a body that stands on the table.
-const RESTING_HEIGHT_M: f64 = 0.001;
-const RESTING_TILT_SQUARED: f64 = 3e-4;
-/// Distance, m, at which the tool passes clear of a body.
-const CLEARANCE_M: f32 = 0.002;
 
 /// Pose of the tool: position in m and unit quaternion x, y, z, w, base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,7 +79,7 @@ pub struct World<'a> {
 
 impl<'a> World<'a> {
     /// Builds the world of `theta` in the state given by the bodies and the tool pose. Values must have passed
-    /// [`check_theta`].
+    /// [`crate::feasible::check_theta`].
     #[must_use]
     pub fn restore(
         config: &'a WorldConfig,
@@ -367,7 +355,7 @@ fn material(builder: ColliderBuilder, friction: f64, config: &WorldConfig) -> Co
         .restitution_combine_rule(CoefficientCombineRule::Max)
 }
 
-fn shared_shape(shape: ObjectShape, size_m: [f64; 3]) -> SharedShape {
+pub(crate) fn shared_shape(shape: ObjectShape, size_m: [f64; 3]) -> SharedShape {
     let [a, b, c] = size_m.map(|v| v as f32);
     match shape {
         ObjectShape::Box => SharedShape::new(Cuboid::new(Vector::new(a, b, c) / 2.0)),
@@ -377,171 +365,14 @@ fn shared_shape(shape: ObjectShape, size_m: [f64; 3]) -> SharedShape {
 }
 
 /// parry's cylinders stand along y, ours along z.
-fn shape_axis_angle(shape: ObjectShape) -> Vector {
+pub(crate) fn shape_axis_angle(shape: ObjectShape) -> Vector {
     match shape {
         ObjectShape::Cylinder => Vector::new(std::f32::consts::FRAC_PI_2, 0.0, 0.0),
         ObjectShape::Box | ObjectShape::Sphere => Vector::ZERO,
     }
 }
 
-/// Whether nothing can happen while the tool moves in a straight line from `tool` to `target_m`: every body stands upright at rest and the
-/// tool passes clear of all of them. Then a simulated world would return the state it was given, up to the settling of its
-/// contacts by some 0.1 mm, and need not be simulated. Only meant for vertical gravity: a tilt can set a resting body in motion.
-#[must_use]
-pub fn nothing_happens(
-    config: &WorldConfig,
-    theta: &Theta,
-    object: &BodyState,
-    obstacle: Option<&BodyState>,
-    tool: &ToolPose,
-    target_m: [f64; 3],
-    tool_shapes: &[ToolShape],
-) -> bool {
-    let rests = |shape: ObjectShape, size_m: [f64; 3], body: &BodyState| {
-        let speed = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let [x, y, _, _] = body.orientation;
-        let upright = shape == ObjectShape::Sphere || x * x + y * y < RESTING_TILT_SQUARED;
-        let height_m = body.position_m[2] - config.table_height_m - shape.half_height_m(size_m);
-        speed(body.linear_mps) < RESTING_SPEED_MPS
-            && speed(body.angular_rps) < RESTING_SPIN_RPS
-            && upright
-            && height_m.abs() < RESTING_HEIGHT_M
-    };
-    let clear = |shape: ObjectShape, size_m: [f64; 3], body: &BodyState| {
-        let at = pose(body.position_m, body.orientation) * Pose::rotation(shape_axis_angle(shape));
-        let bounds = shared_shape(shape, size_m).compute_aabb(&at);
-        tool_shapes.iter().all(|part| {
-            let [a, b, radius] = match part {
-                ToolShape::Ball { center_m, radius_m } => {
-                    [vector(*center_m), vector(*center_m), Vector::splat(*radius_m as f32)]
-                }
-                ToolShape::Capsule { a_m, b_m, radius_m } => {
-                    [vector(*a_m), vector(*b_m), Vector::splat(*radius_m as f32)]
-                }
-            };
-            let from = pose(tool.position_m, tool.orientation);
-            let to = pose(target_m, tool.orientation);
-            let ends = [from.transform_point(a), from.transform_point(b), to.transform_point(a), to.transform_point(b)];
-            let margin = radius + Vector::splat(CLEARANCE_M);
-            let low = ends.iter().fold(Vector::splat(f32::MAX), |m, p| m.min(*p)) - margin;
-            let high = ends.iter().fold(Vector::splat(f32::MIN), |m, p| m.max(*p)) + margin;
-            low.cmpgt(bounds.maxs).any() || high.cmplt(bounds.mins).any()
-        })
-    };
-    let quiet = |shape, size_m, body: &BodyState| rests(shape, size_m, body) && clear(shape, size_m, body);
-    let obstacle_quiet = match (&theta.obstacle, obstacle) {
-        (Some(o), Some(body)) => {
-            let moves = config.obstacle_mobility == ObstacleMobility::Movable;
-            (!moves || rests(o.shape, o.size_m, body)) && clear(o.shape, o.size_m, body)
-        }
-        _ => true,
-    };
-    obstacle_quiet && quiet(theta.object.shape, theta.object.size_m, object)
-}
-
-/// Checks the values of Θ against their physical range: finite, positive masses and sizes, friction in [0, 1], centre of mass
-/// within the shape's largest size.
-///
-/// # Errors
-///
-/// [`Impossible`], naming the value and its range.
-pub fn check_theta(theta: &Theta) -> Result<(), Impossible> {
-    let range = |what, value: f64, low: f64, high: f64| {
-        if !value.is_finite() {
-            Err(Impossible::NotFinite { what })
-        } else if value < low || value > high {
-            Err(Impossible::OutOfRange { what, value, low, high })
-        } else {
-            Ok(())
-        }
-    };
-    let object = &theta.object;
-    range("object mass (kg)", object.mass_kg, 0.005, 100.0)?;
-    range("object friction", object.friction, 0.0, 1.0)?;
-    for size in &object.size_m[..object.shape.size_count()] {
-        range("object size (m)", *size, 0.005, 1.0)?;
-    }
-    for (axis, com) in object.com_m.iter().enumerate() {
-        let half = match (object.shape, axis) {
-            (ObjectShape::Box, _) => object.size_m[axis] / 2.0,
-            (ObjectShape::Cylinder, 2) => object.size_m[1] / 2.0,
-            _ => object.size_m[0],
-        };
-        range("object centre of mass (m)", *com, -half, half)?;
-    }
-    if let Some(obstacle) = &theta.obstacle {
-        range("obstacle mass (kg)", obstacle.mass_kg, 0.005, 1000.0)?;
-        for size in &obstacle.size_m[..obstacle.shape.size_count()] {
-            range("obstacle size (m)", *size, 0.005, 1.0)?;
-        }
-    }
-    Ok(())
-}
-
-/// Checks that the bodies of a hypothesis do not overlap more than soft contacts do, and that none has sunk into the table.
-///
-/// # Errors
-///
-/// [`Impossible`], naming the bodies or values.
-pub fn check_overlaps(
-    config: &WorldConfig,
-    theta: &Theta,
-    object: &BodyState,
-    obstacle: Option<&BodyState>,
-    tool: &ToolPose,
-    tool_shapes: &[ToolShape],
-) -> Result<(), Impossible> {
-    let body = |shape, size_m, state: &BodyState| {
-        let local = Pose::rotation(shape_axis_angle(shape));
-        (pose(state.position_m, state.orientation) * local, shared_shape(shape, size_m))
-    };
-    let mut bodies = vec![("object", body(theta.object.shape, theta.object.size_m, object))];
-    if let (Some(parameters), Some(state)) = (&theta.obstacle, obstacle) {
-        bodies.push(("obstacle", body(parameters.shape, parameters.size_m, state)));
-    }
-    for (what, (at, shape)) in &bodies {
-        if !at.is_finite() {
-            return Err(Impossible::NotFinite { what });
-        }
-        let lowest = f64::from(shape.compute_aabb(at).mins.z) - config.table_height_m;
-        if lowest < -OVERLAP_LIMIT_M {
-            return Err(Impossible::Overlap {
-                first: what,
-                second: "table",
-                depth_m: -lowest,
-                limit_m: OVERLAP_LIMIT_M,
-            });
-        }
-    }
-    let base_from_tool = pose(tool.position_m, tool.orientation);
-    let tool_parts = tool_shapes.iter().map(|shape| match shape {
-        ToolShape::Ball { center_m, radius_m } => {
-            (base_from_tool * Pose::from_translation(vector(*center_m)), SharedShape::ball(*radius_m as f32))
-        }
-        ToolShape::Capsule { a_m, b_m, radius_m } => {
-            (base_from_tool, SharedShape::capsule(vector(*a_m), vector(*b_m), *radius_m as f32))
-        }
-    });
-    let mut pairs = Vec::new();
-    for part in tool_parts {
-        for (name, other) in &bodies {
-            pairs.push(("tool", part.clone(), *name, other.clone()));
-        }
-    }
-    if let [(first, a), (second, b)] = bodies.as_slice() {
-        pairs.push((first, a.clone(), second, b.clone()));
-    }
-    for (first, (pose_a, a), second, (pose_b, b)) in pairs {
-        let contact = rapier3d::parry::query::contact(&pose_a, &*a, &pose_b, &*b, 0.0).ok().flatten();
-        let depth_m = contact.map_or(0.0, |c| -f64::from(c.dist));
-        if depth_m > OVERLAP_LIMIT_M {
-            return Err(Impossible::Overlap { first, second, depth_m, limit_m: OVERLAP_LIMIT_M });
-        }
-    }
-    Ok(())
-}
-
-fn vector(v: [f64; 3]) -> Vector {
+pub(crate) fn vector(v: [f64; 3]) -> Vector {
     Vector::new(v[0] as f32, v[1] as f32, v[2] as f32)
 }
 
@@ -549,7 +380,7 @@ fn array(v: Vector) -> [f64; 3] {
     [v.x, v.y, v.z].map(f64::from)
 }
 
-fn pose(position_m: [f64; 3], orientation: [f64; 4]) -> Pose {
+pub(crate) fn pose(position_m: [f64; 3], orientation: [f64; 4]) -> Pose {
     let [x, y, z, w] = orientation.map(|v| v as f32);
     Pose::from_parts(vector(position_m), Rotation::from_xyzw(x, y, z, w).normalize())
 }

@@ -197,7 +197,7 @@ mod tests {
         values[37] = 1.7;
         values[38..41].copy_from_slice(&[-0.1, 0.05, 0.05]);
         let particle = particle(&Draw { values, classes: vec![0, 3], component: 0 }, 7, 0.0);
-        assert!(physics_model::world::check_theta(&particle.theta).is_ok(), "{:?}", particle.theta);
+        assert!(physics_model::feasible::check_theta(&particle.theta).is_ok(), "{:?}", particle.theta);
         assert!(particle.state.obstacle.is_none());
     }
 }
