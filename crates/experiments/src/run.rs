@@ -72,10 +72,14 @@ impl Run {
                 if let Some(file) = ours.iter().map(|name| folder.join(name)).find(|file| file.exists()) {
                     return Err(Error::Foreign { file, expected: "run.json" });
                 }
-                write_atomically(&folder.join("scenario.toml"), scenario_toml.as_bytes())?;
                 write_atomically(&identity_file, pretty(&provenance.run).as_bytes())?;
             }
             Err(e) => return Err(file_error(&identity_file, "reading")(e)),
+        }
+        // After the identity, so that a kill in between leaves a folder that says whose it is.
+        let scenario_file = folder.join("scenario.toml");
+        if !scenario_file.exists() {
+            write_atomically(&scenario_file, scenario_toml.as_bytes())?;
         }
         let log_file = folder.join("trials.jsonl");
         let finished = read_trials(&log_file)?;
@@ -298,6 +302,17 @@ mod tests {
         let message = Run::open(folder.path(), provenance(2), "second").unwrap_err().to_string();
         assert!(message.contains("run.json") && message.contains("`seed` is 1, this run has 2"), "{message}");
         assert_eq!(std::fs::read_to_string(folder.path().join("scenario.toml")).unwrap(), "first");
+    }
+
+    #[test]
+    fn a_kill_at_any_point_of_the_start_leaves_a_folder_that_goes_on() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(Run::open(folder.path(), provenance(1), "resolved").unwrap());
+        for last_written in ["trials.jsonl", "scenario.toml"] {
+            std::fs::remove_file(folder.path().join(last_written)).unwrap();
+        }
+        drop(Run::open(folder.path(), provenance(1), "resolved").unwrap());
+        assert_eq!(std::fs::read_to_string(folder.path().join("scenario.toml")).unwrap(), "resolved");
     }
 
     #[test]

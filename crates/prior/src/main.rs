@@ -153,7 +153,8 @@ fn open_trainer(
     sequences: &[Sequence],
     seed: Seed,
 ) -> Result<Trainer> {
-    if !state.is_dir() {
+    // The manifest comes last: without it a first save was killed half way, and there is nothing to go on with.
+    if !state.join("training.json").is_file() {
         if insist {
             return Err(anyhow!("{}: --resume expected an interrupted training, found none", state.display()));
         }
