@@ -12,6 +12,7 @@ pub mod effect;
 pub mod effects;
 pub mod error;
 pub mod feasible;
+mod friction;
 pub mod heuristic;
 pub mod model;
 mod perturb;

@@ -7,12 +7,14 @@
 //! of the contacts, which hides the centre of mass, and recycled contacts change friction.
 
 use rapier3d::prelude::{
-    Ball, CoefficientCombineRule, ColliderBuilder, ColliderHandle, Cuboid, Cylinder, FrictionModel, MassProperties,
-    PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape, SpringCoefficients, Vector,
+    ActiveHooks, Ball, CoefficientCombineRule, ColliderBuilder, ColliderHandle, Cuboid, Cylinder, FrictionModel,
+    MassProperties, PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape, SpringCoefficients,
+    Vector,
 };
 
 use crate::config::{ObstacleMobility, WorldConfig};
 use crate::effect::{BodyView, Effect, Load, Surroundings};
+use crate::friction::OpposeSlip;
 use crate::robot::ToolShape;
 use crate::state::BodyState;
 use crate::theta::{ObjectShape, Theta};
@@ -153,7 +155,7 @@ impl<'a> World<'a> {
     pub fn step(&mut self, position_m: [f64; 3]) -> Wrench {
         self.apply_effects();
         self.physics.bodies[self.tool].set_next_kinematic_translation(vector(position_m));
-        self.physics.step();
+        self.physics.step_with_events(&OpposeSlip, &());
         self.tool_wrench(position_m)
     }
 
@@ -350,6 +352,7 @@ fn insert_body(
 fn material(builder: ColliderBuilder, friction: f64, config: &WorldConfig) -> ColliderBuilder {
     builder
         .friction(friction as f32)
+        .active_hooks(ActiveHooks::MODIFY_SOLVER_CONTACTS)
         .friction_combine_rule(CoefficientCombineRule::Min)
         .restitution(config.restitution as f32)
         .restitution_combine_rule(CoefficientCombineRule::Max)

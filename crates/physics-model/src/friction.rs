@@ -1,0 +1,56 @@
+//! The one place where rapier's friction is corrected.
+//!
+//! Coulomb friction is opposite to the slip. Rapier's solver (0.36) iterates `λ ← cap(λ − K⁻¹ v, μ λₙ)` for the friction impulse λ of
+//! every contact point, with v the slip velocity and K the 2×2 inverse effective mass of the point in the tangent plane. Where the impulse is
+//! at its cap, the fixed point is `λ ∥ −K⁻¹ v`, and not `−v`: at the corner of a sliding box the yaw inertia couples the two tangents
+//! (K₁₂ = −r₁ r₂ / I), so that friction is turned away from the slip by 20° for a cube and by 31° for a flat box, and the sum over the
+//! corners is 6 to 14 % short of μ m g.
+//!
+//! The solver takes a surface velocity u for every contact and iterates with v + u in place of v. With
+//! `u = (2 / tr K) K v − v` the fixed point becomes `λ ∥ −v`. The velocity at the beginning of the step stands for v: exact for
+//! steady slip, and 0 where nothing slips, so that sticking contacts do not creep.
+
+use rapier3d::prelude::{ContactModificationContext, PhysicsHooks, RigidBody, Vector};
+
+/// Hook that makes friction oppose the slip; see the module.
+pub(crate) struct OpposeSlip;
+
+impl PhysicsHooks for OpposeSlip {
+    fn modify_solver_contacts(&self, context: &mut ContactModificationContext) {
+        let bodies = context.bodies;
+        let first = context.rigid_body1.and_then(|handle| bodies.get(handle));
+        let second = context.rigid_body2.and_then(|handle| bodies.get(handle));
+        let Some(manifold) = context.rigid_mut() else { return };
+        let normal = *manifold.normal;
+        for contact in manifold.solver_contacts.iter_mut() {
+            let point = (contact.anchor1 + contact.anchor2) * 0.5;
+            let velocity = |body: Option<&RigidBody>| body.map_or(Vector::ZERO, |b| b.velocity_at_point(point));
+            let slip = velocity(first) - velocity(second);
+            let slip = slip - normal * slip.dot(normal);
+            if slip.length_squared() < 1e-12 {
+                continue;
+            }
+            let response = |along: Vector| {
+                [first, second].into_iter().flatten().map(|body| response(body, point, along)).sum::<Vector>()
+            };
+            // Two orthogonal tangents give K's trace; K v follows from linearity.
+            let across = normal.cross(slip);
+            let k_slip = response(slip);
+            let k_slip = k_slip - normal * k_slip.dot(normal);
+            let squared = slip.length_squared();
+            let trace = (k_slip.dot(slip) + response(across).dot(across)) / squared;
+            contact.tangent_velocity = k_slip * (2.0 / trace) - slip;
+        }
+    }
+}
+
+/// Velocity that a unit impulse `along` at `point` gives to that point of the body.
+fn response(body: &RigidBody, point: Vector, along: Vector) -> Vector {
+    if !body.is_dynamic() {
+        return Vector::ZERO;
+    }
+    let mass = body.mass_properties();
+    let arm = point - mass.world_com;
+    let turn = mass.effective_world_inv_inertia * arm.cross(along);
+    mass.effective_inv_mass * along + turn.cross(arm)
+}
