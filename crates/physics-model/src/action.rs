@@ -69,6 +69,20 @@ pub fn minimum_jerk(time: f64) -> f64 {
     t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
 }
 
+/// First derivative of [`minimum_jerk`] by `time`: 30 t² (1 − t)².
+#[must_use]
+pub fn minimum_jerk_rate(time: f64) -> f64 {
+    let t = time.clamp(0.0, 1.0);
+    30.0 * t * t * (1.0 - t) * (1.0 - t)
+}
+
+/// Second derivative of [`minimum_jerk`] by `time`: 60 t (1 − t) (1 − 2 t).
+#[must_use]
+pub fn minimum_jerk_acceleration(time: f64) -> f64 {
+    let t = time.clamp(0.0, 1.0);
+    60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,6 +103,12 @@ mod tests {
     #[test]
     fn minimum_jerk_starts_and_ends_at_rest_with_no_acceleration() {
         let h = 1e-4;
+        for t in [0.1, 0.4, 0.7] {
+            let rate = (minimum_jerk(t + h) - minimum_jerk(t - h)) / (2.0 * h);
+            let acceleration = (minimum_jerk_rate(t + h) - minimum_jerk_rate(t - h)) / (2.0 * h);
+            assert!((rate - minimum_jerk_rate(t)).abs() < 1e-6);
+            assert!((acceleration - minimum_jerk_acceleration(t)).abs() < 1e-5);
+        }
         assert_eq!(minimum_jerk(0.0), 0.0);
         assert_eq!(minimum_jerk(1.0), 1.0);
         assert!((minimum_jerk(0.5) - 0.5).abs() < 1e-15);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng, Step};
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +11,8 @@ use crate::config::{ForceSensing, PushConfig};
 use crate::effect::{Effect, EffectConfig};
 use crate::error::Impossible;
 use crate::feasible::{check_overlaps, check_theta, nothing_happens};
+use crate::force::{ForceSensor, resting_reading};
+use crate::motion::JointPath;
 use crate::perturb;
 use crate::reward::Events;
 use crate::robot::Robot;
@@ -162,7 +164,7 @@ impl PushModel {
 
     /// Observation before the first action: no contact force yet.
     pub fn initial_observation(&self, particle: &mut Particle, rng: &mut Rng) -> Observation {
-        particle.force = self.force_readings(&particle.state.joints_rad, &Wrench::default());
+        particle.force = resting_reading(&self.robot, &self.config.sensor, &particle.state.joints_rad);
         self.config.sensor.observe(&self.readings(particle), rng)
     }
 
@@ -181,8 +183,15 @@ impl PushModel {
         report.events.out_of_reach = goal_joints.is_none();
 
         if self.is_quiet(particle, &tool, if goal_joints.is_some() { target } else { start }) {
+            let mut sensor = self.force_sensor(&particle.state.joints_rad, goal_joints.as_deref(), start, target);
+            let steps = world_config.control_steps;
+            let duration_secs = world_config.control_period_secs * f64::from(steps);
+            for step in 1..=steps {
+                sensor.add(f64::from(step) / f64::from(steps), duration_secs, &Wrench::default());
+            }
             let joints = goal_joints.unwrap_or_else(|| particle.state.joints_rad.clone());
-            return self.pass_quietly(particle, joints, report, rng);
+            let force = sensor.mean(&joints);
+            return self.pass_quietly(particle, joints, force, report, rng);
         }
         let mut world = World::restore(
             world_config,
@@ -193,19 +202,24 @@ impl PushModel {
             &tool,
             self.robot.tool_shapes(),
         );
-        let mut mean = Wrench::default();
+        let steps = world_config.control_steps;
+        let duration_secs = world_config.control_period_secs * f64::from(steps);
+        let mut sensor = self.force_sensor(&particle.state.joints_rad, goal_joints.as_deref(), start, target);
         let mut position = start;
+        let mut share = 0.0;
         let mut stopped = goal_joints.is_none();
-        for step in 1..=world_config.control_steps {
+        for step in 1..=steps {
+            let time = f64::from(step) / f64::from(steps);
             if !stopped {
-                let share = minimum_jerk(f64::from(step) / f64::from(world_config.control_steps));
+                share = minimum_jerk(time);
                 position = std::array::from_fn(|i| start[i] + share * (target[i] - start[i]));
             }
             let wrench = world.step(position);
-            mean.add_scaled(&wrench, 1.0 / f64::from(world_config.control_steps));
             report.tool_touched |= wrench.force_magnitude_n() > 0.0;
             report.obstacle_touched |= world.obstacle_touched();
-            if self.is_large(&particle.state.joints_rad, &wrench) {
+            let large =
+                if stopped { sensor.add_stopped(share, &wrench) } else { sensor.add(time, duration_secs, &wrench) };
+            if large {
                 // The arm's collision reaction: it stops where it is for the rest of the action.
                 report.events.large_force = true;
                 stopped = true;
@@ -229,7 +243,7 @@ impl PushModel {
                 joints
             };
         }
-        particle.force = self.force_readings(&particle.state.joints_rad, &mean);
+        particle.force = sensor.mean(&particle.state.joints_rad);
         let after = particle.state.object.position_m;
         let moved = (0..3).map(|i| (after[i] - before[i]).powi(2)).sum::<f64>().sqrt();
         report.events.first_moved = !particle.object_moved && moved > task.reward.moved_threshold_m;
@@ -252,6 +266,7 @@ impl PushModel {
         &self,
         particle: &mut Particle,
         joints_rad: Vec<f64>,
+        force: [f64; 6],
         mut report: ActionReport,
         rng: &mut Rng,
     ) -> (Step<Observation>, ActionReport) {
@@ -261,7 +276,7 @@ impl PushModel {
             body.linear_mps = [0.0; 3];
             body.angular_rps = [0.0; 3];
         }
-        particle.force = self.force_readings(&particle.state.joints_rad, &Wrench::default());
+        particle.force = force;
         report.events.goal = self.config.task.goal.contains(particle.state.object.position_m);
         let observation = self.config.sensor.observe(&self.readings(particle), rng);
         let outcome = if report.events.goal { Outcome::Terminal } else { Outcome::Continue };
@@ -274,44 +289,26 @@ impl PushModel {
         ToolPose { position_m: base_from_tool.translation.vector.into(), orientation: [q.i, q.j, q.k, q.w] }
     }
 
-    fn is_large(&self, joints_rad: &[f64], wrench: &Wrench) -> bool {
-        let limit = self.config.sensor.large_force_limit;
-        match self.config.sensor.force {
-            ForceSensing::Wrist => wrench.force_magnitude_n() > limit,
-            ForceSensing::JointTorques => {
-                wrench.force_magnitude_n() > 0.0
-                    && self.joint_torques(joints_rad, wrench).iter().any(|t| t.abs() > limit)
+    /// A sensor for the move of the tool from `start_m` to `target_m`, or for none.
+    fn force_sensor(
+        &self,
+        start_rad: &[f64],
+        end_rad: Option<&[f64]>,
+        start_m: [f64; 3],
+        target_m: [f64; 3],
+    ) -> ForceSensor<'_> {
+        let path = ForceSensor::needs_path(&self.config.sensor).then(|| match end_rad {
+            None => JointPath::resting(start_rad),
+            Some(end_rad) => {
+                let middle_m = std::array::from_fn(|i| 0.5 * (start_m[i] + target_m[i]));
+                let middle_rad = self.joints_for(start_rad, middle_m).unwrap_or_else(|| {
+                    // Both ends are within the limits: what lies between them is reachable but for the solver's last digits.
+                    start_rad.iter().zip(end_rad).map(|(a, b)| 0.5 * (a + b)).collect()
+                });
+                JointPath::through(start_rad, &middle_rad, end_rad)
             }
-        }
-    }
-
-    fn force_readings(&self, joints_rad: &[f64], wrench: &Wrench) -> [f64; 6] {
-        match self.config.sensor.force {
-            ForceSensing::Wrist => {
-                let base_from_wrist = self.robot.base_from_wrist(joints_rad);
-                let tool = self.robot.base_from_tool(joints_rad).translation.vector;
-                let force = Vector3::from(wrench.force_n);
-                let arm = tool - base_from_wrist.translation.vector;
-                let torque = Vector3::from(wrench.torque_nm) + arm.cross(&force);
-                let force = base_from_wrist.rotation.inverse_transform_vector(&force);
-                let torque = base_from_wrist.rotation.inverse_transform_vector(&torque);
-                [force.x, force.y, force.z, torque.x, torque.y, torque.z]
-            }
-            ForceSensing::JointTorques => self.joint_torques(joints_rad, wrench),
-        }
-    }
-
-    /// Torques that the motors hold, N·m: gravity minus Jᵀ wrench; unused places are 0.
-    fn joint_torques(&self, joints_rad: &[f64], wrench: &Wrench) -> [f64; 6] {
-        let gravity = self.robot.gravity_torque(joints_rad);
-        let [fx, fy, fz] = wrench.force_n;
-        let [tx, ty, tz] = wrench.torque_nm;
-        let contact = self.robot.contact_torque(joints_rad, &Vector6::new(fx, fy, fz, tx, ty, tz));
-        let mut torques = [0.0; 6];
-        for (j, torque) in torques.iter_mut().enumerate().take(self.joint_count()) {
-            *torque = gravity[j] - contact[j];
-        }
-        torques
+        });
+        ForceSensor::new(&self.robot, &self.config.sensor, path)
     }
 }
 

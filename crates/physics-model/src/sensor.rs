@@ -26,7 +26,7 @@ const KEY_LEN: usize = 9;
 /// Sawyer (20): joint positions (7, rad), wrist force (3, N) and torque (3, N·m), object pose (7).
 /// Jaco (13): joint torques (6, N·m), object pose (7). The pose is position (m, base frame) and unit quaternion x, y, z, w with w ≥ 0.
 /// Force and torque are means over the action: what the environment exerts on the hand, in the axes and at the origin of the wrist
-/// frame. Joint torques are those that the motors hold: gravity minus Jᵀ wrench.
+/// frame. Joint torques are means over the action of what the motors give: M(q) q̈ + C(q, q̇) q̇ + g(q) − Jᵀ wrench.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observation(pub Vec<f64>);
 

@@ -212,6 +212,70 @@ fn a_free_jaco_holds_its_own_weight() {
 }
 
 #[test]
+fn the_joints_of_a_jaco_feel_the_push_through_the_transposed_jacobian() {
+    let (model, joints) = model("jaco", ObstacleMobility::Fixed);
+    // The fingers reach the object in the second action.
+    let run = |y_m: f64| {
+        let mut particle = particle(&model, &joints, y_m);
+        particle.theta.object.com_m = [0.0, 0.0, -0.02];
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        for _ in 0..5 {
+            model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng);
+        }
+        let before = particle.state.joints_rad.clone();
+        model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng);
+        (particle.force, before, particle.state)
+    };
+    let (pushing, before, state) = run(-0.1);
+    let (free, _, far) = run(0.3);
+    assert_eq!(far.joints_rad, state.joints_rad, "the same motion");
+    assert!(state.object.position_m[1] > -0.09, "pushed: {:?}", state.object.position_m);
+    let middle: Vec<f64> = before.iter().zip(&state.joints_rad).map(|(a, b)| 0.5 * (a + b)).collect();
+    let jacobian = model.robot().jacobian(&middle, model.robot().tool());
+    let torque = nalgebra::Vector6::from_fn(|j, _| free[j] - pushing[j]);
+    let transposed = jacobian.fixed_columns::<6>(0).transpose();
+    let wrench = transposed.lu().solve(&torque).expect("no singular pose");
+    // Two fingers push the box along +y with μ m g.
+    let expected = 0.4 * 0.5 * 9.81;
+    assert!((-wrench[1] / expected - 1.0).abs() < 0.2, "{wrench}");
+    assert!(wrench[0].abs() < 0.25 * expected, "{wrench}");
+}
+
+#[test]
+fn the_motion_of_a_free_arm_takes_the_torques_of_its_inverse_dynamics() {
+    let (model, joints) = model("jaco", ObstacleMobility::Fixed);
+    let mut particle = particle(&model, &joints, 0.3);
+    model.act(&mut particle, Action::ALL[PLUS_Y], &mut Seed(1).stream(Purpose::Test, 0));
+    // The mean over the ends of the control steps, with joint positions solved for one by one and their derivatives by differences.
+    let (n, duration) = (20, 1.0 / 3.0);
+    let start = model.tool_position_m(&joints);
+    let at = |time: f64| {
+        let share = physics_model::action::minimum_jerk(time);
+        model.joints_for(&joints, [start[0], start[1] + 0.02 * share, start[2]]).unwrap()
+    };
+    let mut mean = [0.0; 6];
+    for k in 0..n {
+        let (time, h) = ((f64::from(k) + 1.0) / f64::from(n), 2e-3);
+        let (before, now, after) = (at(time - h), at(time), at(time + h));
+        let step = h * duration;
+        let rate: Vec<f64> = (0..6).map(|j| (after[j] - before[j]) / (2.0 * step)).collect();
+        let acceleration: Vec<f64> = (0..6).map(|j| (after[j] - 2.0 * now[j] + before[j]) / (step * step)).collect();
+        let torque = model.robot().inverse_dynamics(&now, &rate, &acceleration);
+        for (sum, t) in mean.iter_mut().zip(torque.iter()) {
+            *sum += t / f64::from(n);
+        }
+    }
+    let (at_start, at_end) =
+        (model.robot().gravity_torque(&joints), model.robot().gravity_torque(&particle.state.joints_rad));
+    let mut differs = 0.0_f64;
+    for j in 0..6 {
+        assert!((particle.force[j] - mean[j]).abs() < 1e-3, "joint {j}: {} and {}", particle.force[j], mean[j]);
+        differs = differs.max((at_start[j] - at_end[j]).abs());
+    }
+    assert!(differs > 0.05, "gravity changes on the way by {differs} N·m, so that a mean is not a value at one end");
+}
+
+#[test]
 fn passing_clear_of_a_resting_object_equals_its_simulation() {
     let (model, joints) = model("sawyer", ObstacleMobility::Movable);
     let start = with_obstacle(particle(&model, &joints, 0.0), 0.1);

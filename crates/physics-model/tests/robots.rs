@@ -339,3 +339,44 @@ fn missing_urdf_and_unknown_joint_say_where_and_what() {
     config.urdf = "Cargo.toml".into();
     assert!(matches!(Robot::load(&config, &root()), Err(RobotError::Parse { .. })));
 }
+
+#[test]
+fn inverse_dynamics_agree_with_pinocchio() {
+    // Sawyer's URDF leaves out three helper links of 1e-8 kg and Pinocchio reads it as given: nothing to tolerate but rounding.
+    for name in ["sawyer", "jaco"] {
+        let robot = load(name);
+        let n = robot.joint_count();
+        let file = format!("{}/tests/data/{name}_dynamics.csv", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(file).expect("reference vectors");
+        let rows: Vec<Vec<f64>> =
+            text.lines().skip(2).map(|line| line.split(',').map(|v| v.parse().expect("number")).collect()).collect();
+        assert_eq!(rows.len(), 25);
+        for row in rows {
+            let torque = robot.inverse_dynamics(&row[..n], &row[n..2 * n], &row[2 * n..3 * n]);
+            for (ours, theirs) in torque.iter().zip(&row[3 * n..]) {
+                assert!((ours - theirs).abs() < 1e-9 * (1.0 + theirs.abs()), "{name}: {ours} and {theirs}");
+            }
+        }
+    }
+}
+
+#[test]
+fn inverse_dynamics_at_rest_are_gravity_and_the_mass_matrix() {
+    for name in ["sawyer", "jaco"] {
+        let robot = load(name);
+        let n = robot.joint_count();
+        for reference in references(name, n) {
+            let zero = vec![0.0; n];
+            let gravity = robot.inverse_dynamics(&reference.q, &zero, &zero);
+            for j in 0..n {
+                let mut unit = zero.clone();
+                unit[j] = 1.0;
+                let torque = robot.inverse_dynamics(&reference.q, &zero, &unit) - gravity;
+                for i in 0..n {
+                    assert!((gravity[i] - reference.gravity[i]).abs() < 1e-6);
+                    assert!((torque[i] - reference.mass[(i, j)]).abs() < 1e-6, "{name}: M[{i}, {j}]");
+                }
+            }
+        }
+    }
+}

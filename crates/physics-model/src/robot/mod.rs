@@ -10,6 +10,7 @@
 
 mod chain;
 mod config;
+mod dynamics;
 mod error;
 mod ik;
 mod shapes;
@@ -226,6 +227,17 @@ impl Robot {
     #[must_use]
     pub fn mass_matrix(&self, q: &[f64]) -> MassMatrix {
         self.chain.mass_matrix(&self.chain.posture(q))
+    }
+
+    /// Torques, N·m, that the motors must give for a motion without contact: M(q) q̈ + C(q, q̇) q̇ + g(q), with `q` in rad, `rate` in rad/s and
+    /// `acceleration` in rad/s². A contact adds −[`Self::contact_torque`].
+    ///
+    /// # Panics
+    ///
+    /// If the slices have not one value per joint.
+    #[must_use]
+    pub fn inverse_dynamics(&self, q: &[f64], rate: &[f64], acceleration: &[f64]) -> JointVector {
+        self.chain.inverse_dynamics(q, rate, acceleration)
     }
 
     /// Torques, N·m, that a wrench at the controlled point causes at `q` (rad): Jᵀw. `wrench` is force (N) and torque (N·m), base axes,

@@ -1,0 +1,114 @@
+//! The joints' way through one action.
+
+use crate::action::{minimum_jerk, minimum_jerk_acceleration, minimum_jerk_rate};
+use crate::state::MAX_JOINTS;
+
+/// Joint positions as a quadratic function of the share of the tool's path: through its start, middle and end.
+///
+/// Over 2 cm the third-order term that is left out is below 10 µrad for both arms (tested).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointPath {
+    count: usize,
+    start: [f64; MAX_JOINTS],
+    linear: [f64; MAX_JOINTS],
+    quadratic: [f64; MAX_JOINTS],
+}
+
+/// Joint positions (rad), rates (rad/s) and accelerations (rad/s²) at one moment; places beyond the joint count are 0.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointMoment {
+    count: usize,
+    position: [f64; MAX_JOINTS],
+    rate: [f64; MAX_JOINTS],
+    acceleration: [f64; MAX_JOINTS],
+}
+
+impl JointPath {
+    /// A path through three configurations, rad.
+    pub(crate) fn through(start: &[f64], middle: &[f64], end: &[f64]) -> Self {
+        let mut path = Self {
+            count: start.len(),
+            start: [0.0; MAX_JOINTS],
+            linear: [0.0; MAX_JOINTS],
+            quadratic: [0.0; MAX_JOINTS],
+        };
+        for j in 0..path.count {
+            path.start[j] = start[j];
+            path.linear[j] = 4.0 * middle[j] - 3.0 * start[j] - end[j];
+            path.quadratic[j] = 2.0 * (start[j] + end[j] - 2.0 * middle[j]);
+        }
+        path
+    }
+
+    /// A path that does not leave `start`, rad.
+    pub(crate) fn resting(start: &[f64]) -> Self {
+        Self::through(start, start, start)
+    }
+
+    /// The arm after the share `time` in [0, 1] of a minimum-jerk move that takes `duration_secs`.
+    pub(crate) fn moment(&self, time: f64, duration_secs: f64) -> JointMoment {
+        let share = minimum_jerk(time);
+        let share_rate = minimum_jerk_rate(time) / duration_secs;
+        let share_acceleration = minimum_jerk_acceleration(time) / (duration_secs * duration_secs);
+        let mut moment = self.stopped(share);
+        for j in 0..self.count {
+            let slope = self.linear[j] + 2.0 * self.quadratic[j] * share;
+            moment.rate[j] = slope * share_rate;
+            moment.acceleration[j] = slope * share_acceleration + 2.0 * self.quadratic[j] * share_rate * share_rate;
+        }
+        moment
+    }
+
+    /// The arm at rest after `share` in [0, 1] of the path.
+    pub(crate) fn stopped(&self, share: f64) -> JointMoment {
+        let mut moment = JointMoment {
+            count: self.count,
+            position: [0.0; MAX_JOINTS],
+            rate: [0.0; MAX_JOINTS],
+            acceleration: [0.0; MAX_JOINTS],
+        };
+        for j in 0..self.count {
+            moment.position[j] = self.start[j] + share * (self.linear[j] + share * self.quadratic[j]);
+        }
+        moment
+    }
+}
+
+impl JointMoment {
+    pub(crate) fn position_rad(&self) -> &[f64] {
+        &self.position[..self.count]
+    }
+
+    pub(crate) fn rate_rps(&self) -> &[f64] {
+        &self.rate[..self.count]
+    }
+
+    pub(crate) fn acceleration_rps2(&self) -> &[f64] {
+        &self.acceleration[..self.count]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_meets_its_three_points_and_its_derivatives_are_those_of_its_positions() {
+        let path = JointPath::through(&[0.1, -0.4], &[0.3, -0.1], &[0.4, 0.6]);
+        assert_eq!(path.stopped(0.0).position_rad(), [0.1, -0.4]);
+        for (share, expected) in [(0.5, [0.3, -0.1]), (1.0, [0.4, 0.6])] {
+            for (a, b) in path.stopped(share).position_rad().iter().zip(expected) {
+                assert!((a - b).abs() < 1e-15);
+            }
+        }
+        let (duration, h) = (0.4, 1e-5);
+        for time in [0.2, 0.5, 0.9] {
+            let [before, now, after] = [time - h, time, time + h].map(|t| path.moment(t, duration));
+            for j in 0..2 {
+                let rate = (after.position[j] - before.position[j]) / (2.0 * h * duration);
+                let acceleration = (after.rate[j] - before.rate[j]) / (2.0 * h * duration);
+                assert!((rate - now.rate[j]).abs() < 1e-7 && (acceleration - now.acceleration[j]).abs() < 1e-6);
+            }
+        }
+    }
+}
