@@ -19,7 +19,7 @@ use crate::robot::Robot;
 use crate::sensor::{Observation, ObservationKey, Readings};
 use crate::state::State;
 use crate::theta::Theta;
-use crate::world::{ToolPose, World, Wrench};
+use crate::world::{Divergence, ToolPose, World, Wrench};
 
 /// Attempts at moving a hypothesis to a possible one.
 const PERTURB_DRAWS: usize = 5;
@@ -55,6 +55,8 @@ pub struct ActionReport {
     pub obstacle_touched: bool,
     /// The tool touched something.
     pub tool_touched: bool,
+    /// The simulation ended in an impossible world; the particle is as it was before.
+    pub divergence: Option<Divergence>,
 }
 
 /// The simulator G(s, a | Θ) of the pushing task.
@@ -226,15 +228,23 @@ impl PushModel {
             }
         }
 
-        if world.diverged() {
+        let (object, obstacle) = (world.object(), world.obstacle());
+        let tool = ToolPose { position_m: position, ..tool };
+        let shapes = self.robot.tool_shapes();
+        report.divergence = world.divergence().or_else(|| {
+            check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &tool, shapes)
+                .is_err()
+                .then_some(Divergence::Overlaps)
+        });
+        if report.divergence.is_some() {
             // The state stays as it was, so that nothing downstream meets a value that is not finite.
             let observation = self.config.sensor.observe(&self.readings(particle), rng);
             let reward = task.reward.reward(report.events);
             return (Step { observation, reward, outcome: Outcome::Diverged }, report);
         }
         let before = particle.state.object.position_m;
-        particle.state.object = world.object();
-        particle.state.obstacle = world.obstacle();
+        particle.state.object = object;
+        particle.state.obstacle = obstacle;
         if let Some(joints) = goal_joints {
             // A move that was stopped early ends on the way to its target.
             particle.state.joints_rad = if report.events.large_force {

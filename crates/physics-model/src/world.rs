@@ -11,6 +11,7 @@ use rapier3d::prelude::{
     MassProperties, PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape, SpringCoefficients,
     Vector,
 };
+use serde::{Deserialize, Serialize};
 
 use crate::config::{ObstacleMobility, WorldConfig};
 use crate::effect::{BodyView, Effect, Load, Surroundings};
@@ -66,6 +67,20 @@ struct Body {
     half_height_m: f64,
     radius_m: f64,
     dynamic: bool,
+}
+
+/// What a simulation must not end in: no push of 0.1 m/s does this to rigid bodies, so that the hypothesis is not a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Divergence {
+    /// A pose or velocity is not finite.
+    NotFinite,
+    /// A body is faster than 5 m/s.
+    Flies,
+    /// A body's centre has sunk into the table.
+    Sank,
+    /// Two bodies overlap by more than [`crate::feasible::OVERLAP_LIMIT_M`].
+    Overlaps,
 }
 
 /// A live world: table, tool, object and perhaps an obstacle.
@@ -171,15 +186,23 @@ impl<'a> World<'a> {
         self.obstacle.as_ref().map(|body| self.body_state(body))
     }
 
-    /// Whether a body is not finite, flies, or has sunk into the table: the hypothesis is impossible.
+    /// Why the world as it is now makes its hypothesis impossible, if it does. Overlaps are not looked for here: see
+    /// [`crate::feasible::check_overlaps`].
     #[must_use]
-    pub fn diverged(&self) -> bool {
-        std::iter::once(&self.object).chain(&self.obstacle).any(|body| {
+    pub fn divergence(&self) -> Option<Divergence> {
+        for body in std::iter::once(&self.object).chain(&self.obstacle) {
             let state = self.body_state(body);
-            let speed = state.linear_mps.iter().map(|v| v * v).sum::<f64>().sqrt();
-            let finite = state.to_array().iter().all(|v| v.is_finite());
-            !finite || speed > SPEED_LIMIT_MPS || state.position_m[2] < self.config.table_height_m + SUNK_LIMIT_M
-        })
+            if !state.to_array().iter().all(|v| v.is_finite()) {
+                return Some(Divergence::NotFinite);
+            }
+            if state.linear_mps.iter().map(|v| v * v).sum::<f64>().sqrt() > SPEED_LIMIT_MPS {
+                return Some(Divergence::Flies);
+            }
+            if state.position_m[2] < self.config.table_height_m + SUNK_LIMIT_M {
+                return Some(Divergence::Sank);
+            }
+        }
+        None
     }
 
     /// Whether the object or the tool touches the obstacle.
