@@ -15,7 +15,7 @@ fn root() -> std::path::PathBuf {
 }
 
 /// The model of an arm, and the joint positions at its start.
-pub fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f64>) {
+pub(crate) fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f64>) {
     let text = std::fs::read_to_string(root().join(format!("scenarios/robots/{arm}.toml"))).unwrap();
     let file: toml::Table = toml::from_str(&text).unwrap();
     let config: RobotConfig = file["robot"].clone().try_into().unwrap();
