@@ -36,6 +36,8 @@ pub struct WorldConfig {
     pub tool_friction: f64,
     /// Friction coefficient of the obstacle, taken likewise.
     pub obstacle_friction: f64,
+    /// Stiffness of the arm, N/m, against what blocks it: the tool's overlap times this is felt as force.
+    pub arm_stiffness_npm: f64,
     /// Coefficient of restitution of all contacts.
     pub restitution: f64,
     /// Whether the obstacle can move.

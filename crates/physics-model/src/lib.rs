@@ -8,6 +8,7 @@
 
 pub mod action;
 pub mod config;
+mod contact;
 pub mod effect;
 pub mod effects;
 pub mod error;

@@ -17,7 +17,7 @@ use crate::perturb;
 use crate::reward::Events;
 use crate::robot::Robot;
 use crate::sensor::{Observation, ObservationKey, Readings};
-use crate::state::State;
+use crate::state::{BodyState, State};
 use crate::theta::Theta;
 use crate::world::{Divergence, ToolPose, World, Wrench};
 
@@ -57,6 +57,22 @@ pub struct ActionReport {
     pub tool_touched: bool,
     /// The simulation ended in an impossible world; the particle is as it was before.
     pub divergence: Option<Divergence>,
+}
+
+/// Control steps between two looks at whether anything will still happen in an action.
+const QUIET_CHECK_STEPS: u32 = 4;
+
+/// Where the tool is to go in an action: in a straight line, in its fixed orientation.
+struct Course {
+    tool: ToolPose,
+    target_m: [f64; 3],
+}
+
+/// What an action left behind.
+struct End {
+    object: BodyState,
+    obstacle: Option<BodyState>,
+    tool_m: [f64; 3],
 }
 
 /// The simulator G(s, a | Θ) of the pushing task.
@@ -174,7 +190,6 @@ impl PushModel {
     /// [`GenerativeModel::step`].
     pub fn act(&self, particle: &mut Particle, action: Action, rng: &mut Rng) -> (Step<Observation>, ActionReport) {
         let task = &self.config.task;
-        let world_config = &self.config.world;
         let tool = self.tool_pose(&particle.state.joints_rad);
         let start = tool.position_m;
         let direction = action.direction();
@@ -184,58 +199,10 @@ impl PushModel {
         let mut report = ActionReport::default();
         report.events.out_of_reach = goal_joints.is_none();
 
-        if self.is_quiet(particle, &tool, if goal_joints.is_some() { target } else { start }) {
-            let mut sensor = self.force_sensor(&particle.state.joints_rad, goal_joints.as_deref(), start, target);
-            let steps = world_config.control_steps;
-            let duration_secs = world_config.control_period_secs * f64::from(steps);
-            for step in 1..=steps {
-                sensor.add(f64::from(step) / f64::from(steps), duration_secs, &Wrench::default());
-            }
-            let joints = goal_joints.unwrap_or_else(|| particle.state.joints_rad.clone());
-            let force = sensor.mean(&joints);
-            return self.pass_quietly(particle, joints, force, report, rng);
-        }
-        let mut world = World::restore(
-            world_config,
-            &self.effects,
-            &particle.theta,
-            &particle.state.object,
-            particle.state.obstacle.as_ref(),
-            &tool,
-            self.robot.tool_shapes(),
-        );
-        let steps = world_config.control_steps;
-        let duration_secs = world_config.control_period_secs * f64::from(steps);
+        let course = Course { tool, target_m: if goal_joints.is_some() { target } else { start } };
         let mut sensor = self.force_sensor(&particle.state.joints_rad, goal_joints.as_deref(), start, target);
-        let mut position = start;
-        let mut share = 0.0;
-        let mut stopped = goal_joints.is_none();
-        for step in 1..=steps {
-            let time = f64::from(step) / f64::from(steps);
-            if !stopped {
-                share = minimum_jerk(time);
-                position = std::array::from_fn(|i| start[i] + share * (target[i] - start[i]));
-            }
-            let wrench = world.step(position);
-            report.tool_touched |= wrench.force_magnitude_n() > 0.0;
-            report.obstacle_touched |= world.obstacle_touched();
-            let large =
-                if stopped { sensor.add_stopped(share, &wrench) } else { sensor.add(time, duration_secs, &wrench) };
-            if large {
-                // The arm's collision reaction: it stops where it is for the rest of the action.
-                report.events.large_force = true;
-                stopped = true;
-            }
-        }
+        let end = self.simulate(particle, &course, &mut sensor, &mut report);
 
-        let (object, obstacle) = (world.object(), world.obstacle());
-        let tool = ToolPose { position_m: position, ..tool };
-        let shapes = self.robot.tool_shapes();
-        report.divergence = world.divergence().or_else(|| {
-            check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &tool, shapes)
-                .is_err()
-                .then_some(Divergence::Overlaps)
-        });
         if report.divergence.is_some() {
             // The state stays as it was, so that nothing downstream meets a value that is not finite.
             let observation = self.config.sensor.observe(&self.readings(particle), rng);
@@ -243,12 +210,12 @@ impl PushModel {
             return (Step { observation, reward, outcome: Outcome::Diverged }, report);
         }
         let before = particle.state.object.position_m;
-        particle.state.object = object;
-        particle.state.obstacle = obstacle;
+        particle.state.object = end.object;
+        particle.state.obstacle = end.obstacle;
         if let Some(joints) = goal_joints {
             // A move that was stopped early ends on the way to its target.
             particle.state.joints_rad = if report.events.large_force {
-                self.joints_for(&particle.state.joints_rad, position).unwrap_or(joints)
+                self.joints_for(&particle.state.joints_rad, end.tool_m).unwrap_or(joints)
             } else {
                 joints
             };
@@ -264,33 +231,99 @@ impl PushModel {
         (Step { observation, reward: task.reward.reward(report.events), outcome }, report)
     }
 
-    fn is_quiet(&self, particle: &Particle, tool: &ToolPose, target_m: [f64; 3]) -> bool {
-        let state = &particle.state;
-        let (object, obstacle) = (&state.object, state.obstacle.as_ref());
-        let shapes = self.robot.tool_shapes();
-        self.level && nothing_happens(&self.config.world, &particle.theta, object, obstacle, tool, target_m, shapes)
+    /// Moves the tool along its course. What is simulated lies between the control step in which the tool first comes near a body, or all
+    /// of them if a body does not rest, and the one after which everything rests and the tool stays clear.
+    fn simulate(
+        &self,
+        particle: &Particle,
+        course: &Course,
+        sensor: &mut ForceSensor,
+        report: &mut ActionReport,
+    ) -> End {
+        let world_config = &self.config.world;
+        let steps = world_config.control_steps;
+        let duration_secs = world_config.control_period_secs * f64::from(steps);
+        let (start, target) = (course.tool.position_m, course.target_m);
+        let moves = start != target;
+        let (mut object, mut obstacle) = (particle.state.object, particle.state.obstacle);
+        let all_quiet = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &course.tool, target);
+        let mut world: Option<World> = None;
+        let mut ended = false;
+        let (mut position, mut share, mut stopped) = (start, 0.0, !moves);
+        for step in 1..=steps {
+            let time = f64::from(step) / f64::from(steps);
+            let tool = ToolPose { position_m: position, ..course.tool };
+            let before = (position, share);
+            if !stopped {
+                share = minimum_jerk(time);
+                position = std::array::from_fn(|i| start[i] + share * (target[i] - start[i]));
+            }
+            let quiet = all_quiet
+                || ended
+                || (world.is_none() && self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, position));
+            let wrench = if quiet {
+                Wrench::default()
+            } else {
+                let world = world.get_or_insert_with(|| {
+                    let shapes = self.robot.tool_shapes();
+                    let obstacle = obstacle.as_ref();
+                    World::restore(world_config, &self.effects, &particle.theta, &object, obstacle, &tool, shapes)
+                });
+                let wrench = world.step(position);
+                report.tool_touched |= wrench.force_magnitude_n() > 0.0;
+                report.obstacle_touched |= world.obstacle_touched();
+                wrench
+            };
+            let large =
+                if stopped { sensor.add_stopped(share, &wrench) } else { sensor.add(time, duration_secs, &wrench) };
+            let against = (0..3).map(|i| wrench.force_n[i] * (target[i] - start[i])).sum::<f64>() < 0.0;
+            if large && !stopped && against {
+                // The arm's collision reaction: it goes back to where the force was bearable and stays there. A force that does not oppose
+                // the move is left behind by it.
+                report.events.large_force = true;
+                stopped = true;
+                (position, share) = before;
+            }
+            if step % QUIET_CHECK_STEPS == 0 && !ended {
+                if let Some(world) = &world {
+                    let (object, obstacle) = (world.object(), world.obstacle());
+                    let tool = ToolPose { position_m: position, ..course.tool };
+                    let end = if stopped { position } else { target };
+                    ended = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, end);
+                }
+            }
+        }
+        match &world {
+            None => {
+                for body in std::iter::once(&mut object).chain(&mut obstacle) {
+                    body.linear_mps = [0.0; 3];
+                    body.angular_rps = [0.0; 3];
+                }
+            }
+            Some(world) => {
+                (object, obstacle) = (world.object(), world.obstacle());
+                let tool = ToolPose { position_m: position, ..course.tool };
+                let shapes = self.robot.tool_shapes();
+                report.divergence = world.divergence().or_else(|| {
+                    check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &tool, shapes)
+                        .is_err()
+                        .then_some(Divergence::Overlaps)
+                });
+            }
+        }
+        End { object, obstacle, tool_m: position }
     }
 
-    /// An action in which only the arm moves.
-    fn pass_quietly(
+    fn is_quiet(
         &self,
-        particle: &mut Particle,
-        joints_rad: Vec<f64>,
-        force: [f64; 6],
-        mut report: ActionReport,
-        rng: &mut Rng,
-    ) -> (Step<Observation>, ActionReport) {
-        let state = &mut particle.state;
-        state.joints_rad = joints_rad;
-        for body in std::iter::once(&mut state.object).chain(&mut state.obstacle) {
-            body.linear_mps = [0.0; 3];
-            body.angular_rps = [0.0; 3];
-        }
-        particle.force = force;
-        report.events.goal = self.config.task.goal.contains(particle.state.object.position_m);
-        let observation = self.config.sensor.observe(&self.readings(particle), rng);
-        let outcome = if report.events.goal { Outcome::Terminal } else { Outcome::Continue };
-        (Step { observation, reward: self.config.task.reward.reward(report.events), outcome }, report)
+        theta: &Theta,
+        object: &BodyState,
+        obstacle: Option<&BodyState>,
+        tool: &ToolPose,
+        target_m: [f64; 3],
+    ) -> bool {
+        let shapes = self.robot.tool_shapes();
+        self.level && nothing_happens(&self.config.world, theta, object, obstacle, tool, target_m, shapes)
     }
 
     fn tool_pose(&self, joints_rad: &[f64]) -> ToolPose {

@@ -7,13 +7,14 @@
 //! of the contacts, which hides the centre of mass, and recycled contacts change friction.
 
 use rapier3d::prelude::{
-    ActiveHooks, Ball, CoefficientCombineRule, ColliderBuilder, ColliderHandle, Cuboid, Cylinder, FrictionModel,
-    MassProperties, PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape, SpringCoefficients,
-    Vector,
+    ActiveCollisionTypes, ActiveHooks, Ball, CoefficientCombineRule, ColliderBuilder, ColliderHandle, Cuboid, Cylinder,
+    FrictionModel, MassProperties, PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape,
+    SpringCoefficients, Vector,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ObstacleMobility, WorldConfig};
+use crate::contact::{lowest_point, table_wrench, tool_wrench, touches};
 use crate::effect::{BodyView, Effect, Load, Surroundings};
 use crate::friction::OpposeSlip;
 use crate::robot::ToolShape;
@@ -90,6 +91,8 @@ pub struct World<'a> {
     physics: PhysicsWorld,
     tool: RigidBodyHandle,
     tool_colliders: Vec<ColliderHandle>,
+    /// Lowest point of the tool from its centre, m, base axes.
+    tool_lowest: Vector,
     object: Body,
     obstacle: Option<Body>,
 }
@@ -162,7 +165,16 @@ impl<'a> World<'a> {
                 physics.insert_collider(material(builder, config.tool_friction, config), Some(tool_body))
             })
             .collect();
-        Self { config, effects, physics, tool: tool_body, tool_colliders, object: object_body, obstacle: obstacle_body }
+        Self {
+            config,
+            effects,
+            physics,
+            tool: tool_body,
+            tool_colliders,
+            tool_lowest: lowest_point(tool, tool_shapes),
+            object: object_body,
+            obstacle: obstacle_body,
+        }
     }
 
     /// Advances one control step, at whose end the tool is at `position_m` (base frame); its orientation stays.
@@ -171,7 +183,11 @@ impl<'a> World<'a> {
         self.apply_effects();
         self.physics.bodies[self.tool].set_next_kinematic_translation(vector(position_m));
         self.physics.step_with_events(&OpposeSlip, &());
-        self.tool_wrench(position_m)
+        let physics = &self.physics;
+        let mut wrench =
+            tool_wrench(self.config, &physics.narrow_phase, &physics.colliders, &self.tool_colliders, position_m);
+        wrench.add_scaled(&table_wrench(self.config, position_m, self.tool_lowest), 1.0);
+        wrench
     }
 
     /// State of the object.
@@ -209,12 +225,9 @@ impl<'a> World<'a> {
     #[must_use]
     pub fn obstacle_touched(&self) -> bool {
         self.obstacle.as_ref().is_some_and(|obstacle| {
-            std::iter::once(&self.object.collider).chain(&self.tool_colliders).any(|other| {
-                self.physics
-                    .narrow_phase
-                    .contact_pair(obstacle.collider, *other)
-                    .is_some_and(|pair| pair.total_impulse_magnitude() > 0.0)
-            })
+            std::iter::once(&self.object.collider)
+                .chain(&self.tool_colliders)
+                .any(|other| self.physics.narrow_phase.contact_pair(obstacle.collider, *other).is_some_and(touches))
         })
     }
 
@@ -261,49 +274,6 @@ impl<'a> World<'a> {
             angular_rps: array(angular),
         }
     }
-
-    /// Sum over the tool's contacts of normal and friction impulse, over the step's duration: the impulses total all
-    /// substeps.
-    fn tool_wrench(&self, center_m: [f64; 3]) -> Wrench {
-        let center = vector(center_m);
-        let mut force = Vector::ZERO;
-        let mut torque = Vector::ZERO;
-        for collider in &self.tool_colliders {
-            for pair in self.physics.narrow_phase.contact_pairs_with(*collider) {
-                let tool_is_first = pair.collider1 == *collider;
-                for manifold in pair.solver_manifolds() {
-                    // The solver pushes the first body along −normal.
-                    let away = -manifold.data.normal;
-                    for point in manifold.contacts() {
-                        let data = &point.data;
-                        let impulse = away * data.impulse + tangential_impulse(data, away);
-                        let (impulse, local) =
-                            if tool_is_first { (impulse, point.local_p1) } else { (-impulse, point.local_p2) };
-                        let at = self.physics.colliders[*collider].position().transform_point(local);
-                        force += impulse;
-                        torque += (at - center).cross(impulse);
-                    }
-                }
-            }
-        }
-        let rate = 1.0 / self.config.control_period_secs;
-        Wrench { force_n: array(force).map(|v| v * rate), torque_nm: array(torque).map(|v| v * rate) }
-    }
-}
-
-/// Friction impulse of a contact in world axes, on the first body.
-///
-/// rapier gives the total in the solver's tangent basis, which it does not expose; the last substep's impulse is given both in
-/// that basis and in world axes, which reveals the basis.
-fn tangential_impulse(data: &rapier3d::geometry::ContactData, away: Vector) -> Vector {
-    let last = data.warmstart_tangent_impulse;
-    let squared = last.x * last.x + last.y * last.y;
-    if squared < 1e-20 {
-        return Vector::ZERO;
-    }
-    let world = data.warmstart_tangent_world;
-    let first = (world * last.x - away.cross(world) * last.y) / squared;
-    first * data.tangent_impulse.x + away.cross(first) * data.tangent_impulse.y
 }
 
 struct BodySpec {
@@ -358,8 +328,13 @@ fn insert_body(
         spec.mass_kg as f32,
         vector(spec.inertia_kgm2()),
     ));
-    let collider =
+    let mut collider =
         ColliderBuilder::new(shared_shape(spec.shape, spec.size_m)).rotation(shape_axis_angle(spec.shape)).density(0.0);
+    if !movable {
+        // A kinematic tool and a fixed body do not move each other, but the arm feels it (see `contact`).
+        collider =
+            collider.active_collision_types(ActiveCollisionTypes::default() | ActiveCollisionTypes::KINEMATIC_FIXED);
+    }
     let (handle, collider) = physics.insert(builder, material(collider, spec.friction, config));
     Body {
         handle,
@@ -402,7 +377,7 @@ pub(crate) fn vector(v: [f64; 3]) -> Vector {
     Vector::new(v[0] as f32, v[1] as f32, v[2] as f32)
 }
 
-fn array(v: Vector) -> [f64; 3] {
+pub(crate) fn array(v: Vector) -> [f64; 3] {
     [v.x, v.y, v.z].map(f64::from)
 }
 

@@ -105,6 +105,51 @@ fn a_push_against_a_fixed_obstacle_is_a_large_force_and_stops_the_arm() {
 }
 
 #[test]
+fn an_arm_stopped_by_an_obstacle_can_retreat_and_stays_out_of_it() {
+    for arm in ["sawyer", "jaco"] {
+        let (model, joints) = model(arm, ObstacleMobility::Fixed);
+        // Nothing but the obstacle is in the way.
+        let mut particle = with_obstacle(particle(&model, &joints, 0.2), -0.08);
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        let mut stopped = 0;
+        for _ in 0..8 {
+            let report = model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng).1;
+            stopped += u32::from(report.events.large_force);
+            assert_eq!(report.divergence, None, "{arm}");
+            assert_eq!(model.check(&particle), Ok(()), "{arm}");
+        }
+        assert!(stopped >= 2, "{arm}: pushing on is stopped again: {stopped}");
+        let blocked = model.tool_position_m(&particle.state.joints_rad)[1];
+        let (step, report) = model.act(&mut particle, Action::ALL[MINUS_Y], &mut rng);
+        let retreat = blocked - model.tool_position_m(&particle.state.joints_rad)[1];
+        assert!((retreat - 0.02).abs() < 1e-5 && !report.events.large_force, "{arm}: {retreat} {step:?}");
+    }
+}
+
+#[test]
+fn what_is_skipped_before_and_after_a_contact_changes_nothing() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    // The ball's surface is 6 mm from the box: the first half of the move meets nothing.
+    let start = particle(&model, &joints, -0.22 + 0.04 + 0.025 + 0.006);
+    for action in [Action::ALL[PLUS_Y], Action::ALL[1], Action::ALL[3]] {
+        let mut skipped = start.clone();
+        model.act(&mut skipped, action, &mut Seed(1).stream(Purpose::Test, 0));
+        let from = model.tool_position_m(&joints);
+        let pose = physics_model::world::ToolPose { position_m: from, orientation: [0.0, 0.0, 0.0, 1.0] };
+        let (config, shapes) = (&model.config().world, model.robot().tool_shapes());
+        let mut world = World::restore(config, &[], &start.theta, &start.state.object, None, &pose, shapes);
+        for step in 1..=20 {
+            let share = 0.02 * physics_model::action::minimum_jerk(f64::from(step) / 20.0);
+            world.step(std::array::from_fn(|i| from[i] + share * action.direction()[i]));
+        }
+        let (ours, whole) = (skipped.state.object, world.object());
+        let apart = ours.position_m.iter().zip(whole.position_m).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 2e-4, "{action:?}: {apart} m apart");
+        assert!((ours.yaw_rad() - whole.yaw_rad()).abs() < 0.01, "{action:?}");
+    }
+}
+
+#[test]
 fn the_wrist_feels_the_push_in_its_own_axes() {
     let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
     let mut particle = particle(&model, &joints, -0.155);

@@ -35,6 +35,7 @@ pub(crate) fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f6
             gravity_mps2: 9.81,
             tool_friction: 0.2,
             obstacle_friction: 0.5,
+            arm_stiffness_npm: 50_000.0,
             restitution: 0.0,
             obstacle_mobility: mobility,
         },
