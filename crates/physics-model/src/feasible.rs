@@ -1,5 +1,6 @@
 //! Which hypotheses can be worlds at all, and in which worlds nothing will happen: checks that need no simulation.
 
+use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::prelude::{Pose, SharedShape, Vector};
 
 use crate::config::{ObstacleMobility, WorldConfig};
@@ -19,6 +20,8 @@ const RESTING_HEIGHT_M: f64 = 0.001;
 const RESTING_TILT_SQUARED: f64 = 3e-4;
 /// Distance, m, at which the tool passes clear of a body.
 const CLEARANCE_M: f32 = 0.002;
+/// How far, m, a body may get in an action towards a part of the tool that does not push it: a move is 2 cm.
+const BODY_REACH_M: f32 = 0.04;
 
 /// Whether nothing can happen while the tool moves in a straight line from `tool` to `target_m`: every body stands upright at rest and the
 /// tool passes clear of all of them. Then a simulated world would return the state it was given, up to the settling of its
@@ -44,25 +47,8 @@ pub fn nothing_happens(
             && height_m.abs() < RESTING_HEIGHT_M
     };
     let clear = |shape: ObjectShape, size_m: [f64; 3], body: &BodyState| {
-        let at = pose(body.position_m, body.orientation) * Pose::rotation(shape_axis_angle(shape));
-        let bounds = shared_shape(shape, size_m).compute_aabb(&at);
-        tool_shapes.iter().all(|part| {
-            let [a, b, radius] = match part {
-                ToolShape::Ball { center_m, radius_m } => {
-                    [vector(*center_m), vector(*center_m), Vector::splat(*radius_m as f32)]
-                }
-                ToolShape::Capsule { a_m, b_m, radius_m } => {
-                    [vector(*a_m), vector(*b_m), Vector::splat(*radius_m as f32)]
-                }
-            };
-            let from = pose(tool.position_m, tool.orientation);
-            let to = pose(target_m, tool.orientation);
-            let ends = [from.transform_point(a), from.transform_point(b), to.transform_point(a), to.transform_point(b)];
-            let margin = radius + Vector::splat(CLEARANCE_M);
-            let low = ends.iter().fold(Vector::splat(f32::MAX), |m, p| m.min(*p)) - margin;
-            let high = ends.iter().fold(Vector::splat(f32::MIN), |m, p| m.max(*p)) + margin;
-            low.cmpgt(bounds.maxs).any() || high.cmplt(bounds.mins).any()
-        })
+        let bounds = body_bounds(shape, size_m, body);
+        tool_shapes.iter().all(|part| apart(&swept_bounds(part, tool, target_m), &bounds, CLEARANCE_M))
     };
     let quiet = |shape, size_m, body: &BodyState| rests(shape, size_m, body) && clear(shape, size_m, body);
     let obstacle_quiet = match (&theta.obstacle, obstacle) {
@@ -73,6 +59,58 @@ pub fn nothing_happens(
         _ => true,
     };
     obstacle_quiet && quiet(theta.object.shape, theta.object.size_m, object)
+}
+
+/// The parts of the tool that can touch anything while it moves in a straight line to `target_m`: those that come near a body, or the
+/// table. The others need not be simulated.
+#[must_use]
+pub fn parts_in_reach(
+    config: &WorldConfig,
+    theta: &Theta,
+    object: &BodyState,
+    obstacle: Option<&BodyState>,
+    tool: &ToolPose,
+    target_m: [f64; 3],
+    tool_shapes: &[ToolShape],
+) -> Vec<ToolShape> {
+    let object = body_bounds(theta.object.shape, theta.object.size_m, object);
+    let obstacle = theta.obstacle.as_ref().zip(obstacle).map(|(o, body)| body_bounds(o.shape, o.size_m, body));
+    let table_m = config.table_height_m as f32 + CLEARANCE_M;
+    tool_shapes
+        .iter()
+        .filter(|part| {
+            let swept = swept_bounds(part, tool, target_m);
+            swept.mins.z < table_m
+                || !apart(&swept, &object, BODY_REACH_M)
+                || obstacle.is_some_and(|obstacle| !apart(&swept, &obstacle, BODY_REACH_M))
+        })
+        .copied()
+        .collect()
+}
+
+fn body_bounds(shape: ObjectShape, size_m: [f64; 3], body: &BodyState) -> Aabb {
+    let at = pose(body.position_m, body.orientation) * Pose::rotation(shape_axis_angle(shape));
+    shared_shape(shape, size_m).compute_aabb(&at)
+}
+
+/// Box around a part of the tool on its way.
+fn swept_bounds(part: &ToolShape, tool: &ToolPose, target_m: [f64; 3]) -> Aabb {
+    let (a, b, radius) = match part {
+        ToolShape::Ball { center_m, radius_m } => (vector(*center_m), vector(*center_m), *radius_m as f32),
+        ToolShape::Capsule { a_m, b_m, radius_m } => (vector(*a_m), vector(*b_m), *radius_m as f32),
+    };
+    let from = pose(tool.position_m, tool.orientation);
+    let to = pose(target_m, tool.orientation);
+    let ends = [from.transform_point(a), from.transform_point(b), to.transform_point(a), to.transform_point(b)];
+    let low = ends.iter().fold(Vector::splat(f32::MAX), |m, p| m.min(*p)) - Vector::splat(radius);
+    let high = ends.iter().fold(Vector::splat(f32::MIN), |m, p| m.max(*p)) + Vector::splat(radius);
+    Aabb::new(low, high)
+}
+
+/// Whether two boxes are further apart than `margin_m` along an axis.
+fn apart(a: &Aabb, b: &Aabb, margin_m: f32) -> bool {
+    let margin = Vector::splat(margin_m);
+    (a.mins - margin).cmpgt(b.maxs).any() || (a.maxs + margin).cmplt(b.mins).any()
 }
 
 /// Checks the values of Θ against their physical range: finite, positive masses and sizes, friction in [0, 1], centre of mass

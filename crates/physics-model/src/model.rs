@@ -10,7 +10,7 @@ use crate::action::{Action, minimum_jerk};
 use crate::config::{ForceSensing, PushConfig};
 use crate::effect::{Effect, EffectConfig};
 use crate::error::Impossible;
-use crate::feasible::{check_overlaps, check_theta, nothing_happens};
+use crate::feasible::{check_overlaps, check_theta, nothing_happens, parts_in_reach};
 use crate::force::{ForceSensor, resting_reading};
 use crate::motion::JointPath;
 use crate::perturb;
@@ -265,9 +265,10 @@ impl PushModel {
                 Wrench::default()
             } else {
                 let world = world.get_or_insert_with(|| {
+                    let (theta, obstacle) = (&particle.theta, obstacle.as_ref());
                     let shapes = self.robot.tool_shapes();
-                    let obstacle = obstacle.as_ref();
-                    World::restore(world_config, &self.effects, &particle.theta, &object, obstacle, &tool, shapes)
+                    let shapes = parts_in_reach(world_config, theta, &object, obstacle, &tool, target, shapes);
+                    World::restore(world_config, &self.effects, theta, &object, obstacle, &tool, &shapes)
                 });
                 let wrench = world.step(position);
                 report.tool_touched |= wrench.force_magnitude_n() > 0.0;
@@ -284,13 +285,14 @@ impl PushModel {
                 stopped = true;
                 (position, share) = before;
             }
-            if step % QUIET_CHECK_STEPS == 0 && !ended {
-                if let Some(world) = &world {
-                    let (object, obstacle) = (world.object(), world.obstacle());
-                    let tool = ToolPose { position_m: position, ..course.tool };
-                    let end = if stopped { position } else { target };
-                    ended = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, end);
-                }
+            if step % QUIET_CHECK_STEPS == 0
+                && !ended
+                && let Some(world) = &world
+            {
+                let (object, obstacle) = (world.object(), world.obstacle());
+                let tool = ToolPose { position_m: position, ..course.tool };
+                let end = if stopped { position } else { target };
+                ended = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, end);
             }
         }
         match &world {

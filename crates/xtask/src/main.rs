@@ -25,6 +25,9 @@ enum Verb {
     /// Plays trials of methods on a domain and prints the table.
     #[command(disable_help_flag = true)]
     Eval(Rest),
+    /// Times the parts and checks their accuracy, beside peers where those are installed.
+    #[command(disable_help_flag = true)]
+    Bench(Rest),
     /// Runs exactly what CI runs: formatting, lints, all tests.
     Ci,
 }
@@ -41,6 +44,7 @@ fn main() -> ExitCode {
         Verb::Datagen(rest) => program("datagen", &rest.arguments),
         Verb::Train(rest) => program("train", &rest.arguments),
         Verb::Eval(rest) => program("eval", &rest.arguments),
+        Verb::Bench(rest) => program("bench", &rest.arguments),
         Verb::Ci => ci(),
     };
     result.unwrap_or_else(|error| {

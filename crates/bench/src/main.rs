@@ -1,0 +1,129 @@
+//! `cargo xtask bench`: time and accuracy beside peers.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result};
+use bench::physics::{self, Effort, OBSTACLES};
+use bench::report;
+use clap::{Parser, Subcommand};
+use scenario::Selection;
+use serde_json::Value;
+
+/// Benchmarks: time and accuracy, beside peers where those are installed.
+#[derive(Debug, Parser)]
+#[command(name = "bench", version)]
+struct Arguments {
+    #[command(subcommand)]
+    what: What,
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
+    #[arg(long, global = true)]
+    root: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+enum What {
+    /// Time of one action, in turn with MuJoCo and PyBullet (Python of the variable PYTHON, else python3).
+    Physics {
+        /// Batches of every program; medians of these are compared.
+        #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
+        rounds: u32,
+        /// Actions in a batch.
+        #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+        actions: u32,
+        /// Prints one JSON object.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Errors against MuJoCo's recorded answers and closed forms: the page in the docs of physics-model.
+    Accuracy {
+        /// Writes the page into the project.
+        #[arg(long)]
+        write: bool,
+        /// Overrides a scenario entry: key=value.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+    },
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let root = match &arguments.root {
+        Some(root) => root.clone(),
+        None => scenario::find_root(&std::env::current_dir().context("current folder")?)?,
+    };
+    match &arguments.what {
+        What::Physics { rounds, actions, json } => {
+            let effort = Effort { rounds: *rounds as usize, actions: *actions as usize };
+            let result = physics::run(&root, effort, |text| eprintln!("{text}"))?;
+            if *json {
+                println!("{result}");
+            } else {
+                print!("{}", table(&result));
+            }
+        }
+        What::Accuracy { write, set } => {
+            let selection = Selection { set: set.clone(), ..Selection::new(&root) };
+            let page = report::page(&root, &selection.load()?.world)?;
+            if *write {
+                let path = root.join(report::PAGE);
+                std::fs::write(&path, &page).with_context(|| path.display().to_string())?;
+            } else {
+                print!("{page}");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The result as Markdown.
+fn table(result: &Value) -> String {
+    let number = |value: &Value, digits: usize| value.as_f64().map_or("–".into(), |v| format!("{v:.digits$}"));
+    let mut text = String::from(
+        "| tool | obstacle | ours, µs | MuJoCo pyramidal | ratio | MuJoCo elliptic | ratio | two steps of MuJoCo, pyramidal | elliptic | PyBullet |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (tool, rows) in [("ball", result), ("hand", &result["hand"])] {
+        for obstacle in OBSTACLES {
+            let row = &rows[obstacle];
+            let cells = [
+                ("us", 1),
+                ("mujoco_pyramidal_us", 1),
+                ("ratio", 2),
+                ("mujoco_elliptic_us", 1),
+                ("ratio_elliptic", 2),
+                ("mujoco_pyramidal_2_substeps_us", 1),
+                ("mujoco_elliptic_2_substeps_us", 1),
+                ("pybullet_us", 1),
+            ];
+            let cells: Vec<String> = cells.iter().map(|(key, digits)| number(&row[key], *digits)).collect();
+            text += &format!("| {tool} | {obstacle} | {} |\n", cells.join(" | "));
+        }
+    }
+    text += "\n| obstacle | restore, µs | control step, µs | transition of the Sawyer, µs | of the Jaco, µs |\n|---|---|---|---|---|\n";
+    for obstacle in OBSTACLES {
+        let part = &result["parts"][obstacle];
+        let transition = |robot: &str| number(&result["transition"][robot][format!("{obstacle}_us")], 1);
+        text += &format!(
+            "| {obstacle} | {} | {} | {} | {} |\n",
+            number(&part["restore_us"], 1),
+            number(&part["step_us"], 2),
+            transition("sawyer"),
+            transition("jaco")
+        );
+    }
+    let scaling = &result["scaling"];
+    text +=
+        &format!("\nAll {} cores: {} times the throughput of one.\n", scaling["cores"], number(&scaling["speedup"], 2));
+    text += &format!("\n{}\n", result["provenance"]);
+    text
+}

@@ -1,0 +1,153 @@
+//! The accuracy report: a Markdown page in the docs of `physics-model`.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use physics_model::config::WorldConfig;
+
+use crate::accuracy::{SMALL_FORCE_N, SceneError, compare, quantile};
+use crate::closed_forms::measure;
+use crate::scenes::load;
+
+/// Where the page lies in the project.
+pub const PAGE: &str = "crates/physics-model/src/accuracy.md";
+
+/// Scenes beyond these are listed: position, mm; angle, degrees; force, share.
+const OUTLIER: (f64, f64, f64) = (2.0, 3.0, 0.2);
+
+/// Time bases shown beside the scenario's: control steps, solver iterations.
+const TIME_BASES: [(u32, u32); 8] = [(20, 1), (20, 2), (20, 3), (20, 4), (20, 8), (10, 4), (40, 1), (80, 4)];
+
+/// Medians and 90th percentiles over the scenes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Median and 90th percentile of the object's distance, mm.
+    pub position_mm: [f64; 2],
+    /// Of the object's angle, degrees.
+    pub angle_deg: [f64; 2],
+    /// Of the force error, share.
+    pub force: [f64; 2],
+}
+
+/// Summary of the errors.
+#[must_use]
+pub fn summarise(errors: &[SceneError]) -> Summary {
+    let both = |values: Vec<f64>| [0.5, 0.9].map(|level| quantile(values.iter().copied(), level));
+    Summary {
+        position_mm: both(errors.iter().map(|e| e.position_mm).collect()),
+        angle_deg: both(errors.iter().map(|e| e.angle_deg).collect()),
+        force: both(errors.iter().filter_map(|e| e.force).collect()),
+    }
+}
+
+/// The page for the settings of `world`.
+///
+/// # Errors
+///
+/// Missing or broken records.
+pub fn page(root: &Path, world: &WorldConfig) -> Result<String> {
+    let scenes = load(root)?;
+    let errors = |world: &WorldConfig| -> Vec<SceneError> {
+        scenes.iter().map(|(scene, theirs)| compare(scene, theirs, world)).collect()
+    };
+    let ours = errors(world);
+    let mut page = String::new();
+    let _ = writeln!(page, "<!-- Written by `cargo xtask bench accuracy --write`; do not edit. -->\n");
+    let _ = writeln!(
+        page,
+        "Settings of `scenarios/base.toml`: {} control steps of {:.4} s, {} solver iterations each, contacts of {} Hz and damping ratio {}. \
+         MuJoCo 4.0.0 with fine settings (`tests/peers/`), recorded.\n",
+        world.control_steps,
+        world.control_period_secs,
+        world.solver_iterations,
+        world.contact_frequency_hz,
+        world.contact_damping_ratio
+    );
+    let _ =
+        writeln!(page, "## Closed forms\n\n| quantity | closed form | MuJoCo | ours | error |\n|---|---|---|---|---|");
+    for m in measure(root, world)? {
+        let reference = m.exact.unwrap_or(m.mujoco);
+        let exact = m.exact.map_or("–".into(), |v| format!("{v:.4}"));
+        let error = 100.0 * (m.ours / reference - 1.0);
+        let _ = writeln!(page, "| {} | {exact} | {:.4} | {:.4} | {error:+.1} % |", m.text, m.mujoco, m.ours);
+    }
+    let _ = writeln!(
+        page,
+        "\nA body that friction stops ends v h / 2 short (h: substep), because its position follows the speed at the end of each substep: \
+         that is the whole error of the slide and of the spin.\n"
+    );
+    let _ = writeln!(
+        page,
+        "## {} scenes, one 2 cm action each\n\nDistance and angle between where we and MuJoCo leave the object; length of the difference of the mean \
+         forces on the tool over MuJoCo's, where that is at least {SMALL_FORCE_N} N. Median / 90th percentile.\n\n\
+         | control steps × iterations | position, mm | angle, ° | force, % |\n|---|---|---|---|",
+        scenes.len()
+    );
+    for (steps, iterations) in TIME_BASES {
+        let base = WorldConfig {
+            control_steps: steps,
+            control_period_secs: world.control_period_secs * f64::from(world.control_steps) / f64::from(steps),
+            solver_iterations: iterations,
+            ..world.clone()
+        };
+        let chosen = (steps, iterations) == (world.control_steps, world.solver_iterations);
+        let mark = if chosen { "**" } else { "" };
+        let s = summarise(&errors(&base));
+        let _ = writeln!(
+            page,
+            "| {mark}{steps} × {iterations}{mark} | {:.2} / {:.2} | {:.2} / {:.2} | {:.1} / {:.1} |",
+            s.position_mm[0],
+            s.position_mm[1],
+            s.angle_deg[0],
+            s.angle_deg[1],
+            100.0 * s.force[0],
+            100.0 * s.force[1]
+        );
+    }
+    let fine = errors(&WorldConfig {
+        control_steps: 8 * world.control_steps,
+        control_period_secs: world.control_period_secs / 8.0,
+        solver_iterations: 8,
+        contact_frequency_hz: 200.0,
+        ..world.clone()
+    });
+    let s = summarise(&fine);
+    let _ = writeln!(
+        page,
+        "| {} × 8, 200 Hz contacts | {:.2} / {:.2} | {:.2} / {:.2} | {:.1} / {:.1} |",
+        8 * world.control_steps,
+        s.position_mm[0],
+        s.position_mm[1],
+        s.angle_deg[0],
+        s.angle_deg[1],
+        100.0 * s.force[0],
+        100.0 * s.force[1]
+    );
+    let _ = writeln!(
+        page,
+        "\n## Outliers\n\nScenes beyond {} mm, {}° or {:.0} %, with their errors at the finest settings above: what shrinks there is the time step, what stays \
+         is a difference of the engines.\n\n| scene | position, mm | angle, ° | force, % | fine: position, mm | angle, ° | force, % |\n|---|---|---|---|---|---|---|",
+        OUTLIER.0,
+        OUTLIER.1,
+        100.0 * OUTLIER.2
+    );
+    let percent = |force: Option<f64>| force.map_or("–".into(), |f| format!("{:.0}", 100.0 * f));
+    for (error, fine) in ours.iter().zip(&fine) {
+        let force = error.force.unwrap_or(0.0);
+        if error.position_mm > OUTLIER.0 || error.angle_deg > OUTLIER.1 || force > OUTLIER.2 {
+            let _ = writeln!(
+                page,
+                "| {} | {:.2} | {:.1} | {} | {:.2} | {:.1} | {} |",
+                error.name,
+                error.position_mm,
+                error.angle_deg,
+                percent(error.force),
+                fine.position_mm,
+                fine.angle_deg,
+                percent(fine.force)
+            );
+        }
+    }
+    Ok(page)
+}
