@@ -44,6 +44,49 @@ pub struct WorldConfig {
     pub obstacle_mobility: ObstacleMobility,
 }
 
+/// How the arm follows its commands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ArmConfig {
+    /// The tool is where it is commanded to be, whatever it touches.
+    Kinematic,
+    /// The links have their masses and the joints are servos: a load deflects the arm.
+    Dynamic(ServoConfig),
+}
+
+/// Position servo of every joint: torque = K (q_d − q) + D (q̇_d − q̇) + M q̈_d, with gravity compensated.
+///
+/// This is the joint impedance that torque-controlled arms let their users set (Albu-Schäffer, Ott and Hirzinger, "A unified passivity-based
+/// control framework for position, torque and impedance control of flexible joint robots", IJRR 26(1), 2007). One stiffness serves all
+/// joints, because a measured deflection of the tool cannot tell those of seven joints apart. It is a stiffness and no natural
+/// frequency: a stiffness is read off a static test, and the links' inertia without that of the rotors, which URDF does not know, would make
+/// the wrist a thousand times as soft as the base.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ServoConfig {
+    /// K, N·m/rad. A force f deflects the tool by J Jᵀ f / K.
+    pub stiffness_nmprad: f64,
+    /// D = 2 · ratio · √(K Mⱼⱼ), with Mⱼⱼ of the posture in which the action starts: 1 is critical damping of each joint alone.
+    pub damping_ratio: f64,
+}
+
+impl ArmConfig {
+    /// What is wrong with the values, if anything.
+    #[must_use]
+    pub fn problem(&self) -> Option<String> {
+        let Self::Dynamic(servo) = self else { return None };
+        let limits = [
+            ("stiffness_nmprad", servo.stiffness_nmprad, [1.0, 1e6], " N·m/rad"),
+            ("damping_ratio", servo.damping_ratio, [0.1, 100.0], ""),
+        ];
+        limits.into_iter().find_map(|(key, value, [low, high], unit)| {
+            // Also false for NaN.
+            let good = (low..=high).contains(&value);
+            (!good).then(|| format!("dynamic.{key}: expected {low} to {high}{unit}, found {value}"))
+        })
+    }
+}
+
 /// Axis-aligned box that the tool centre may occupy, m, base frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -182,6 +225,8 @@ pub struct PerturbConfig {
 pub struct PushConfig {
     /// World.
     pub world: WorldConfig,
+    /// The arm that moves in it.
+    pub arm: ArmConfig,
     /// Task.
     pub task: TaskConfig,
     /// Sensors.

@@ -16,17 +16,17 @@ use crate::world::{ToolPose, Wrench, array, pose, vector};
 const FREE_OVERLAP_M: f32 = 0.002;
 
 /// Mean wrench on the tool during the last step, about `center_m` (base frame): over the step's duration, the normal and friction impulses of
-/// all its contacts, which total the substeps, and the arm's own resistance.
+/// all its contacts, which total the substeps, and the resistance of an arm of the given stiffness.
 pub(crate) fn tool_wrench(
-    config: &WorldConfig,
     narrow_phase: &NarrowPhase,
     colliders: &ColliderSet,
     tool: &[ColliderHandle],
     center_m: [f64; 3],
+    period_secs: f64,
+    stiffness_npm: f64,
 ) -> Wrench {
     let center = vector(center_m);
-    let period = config.control_period_secs as f32;
-    let stiffness = config.arm_stiffness_npm as f32;
+    let (period, stiffness) = (period_secs as f32, stiffness_npm as f32);
     let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
     for collider in tool {
         for pair in narrow_phase.contact_pairs_with(*collider) {

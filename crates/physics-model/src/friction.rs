@@ -12,6 +12,8 @@
 
 use rapier3d::prelude::{ContactModificationContext, PhysicsHooks, RigidBody, Vector};
 
+use crate::arm::LINK;
+
 /// Hook that makes friction oppose the slip; see the module.
 pub(crate) struct OpposeSlip;
 
@@ -20,6 +22,11 @@ impl PhysicsHooks for OpposeSlip {
         let bodies = context.bodies;
         let first = context.rigid_body1.and_then(|handle| bodies.get(handle));
         let second = context.rigid_body2.and_then(|handle| bodies.get(handle));
+        // A link of the arm stands firm like a kinematic tool: its servos hold it, not its own small mass.
+        let free = [first, second].map(|body| body.filter(|b| b.is_dynamic() && b.user_data != LINK));
+        if free.iter().all(Option::is_none) {
+            return;
+        }
         let Some(manifold) = context.rigid_mut() else { return };
         let normal = *manifold.normal;
         for contact in manifold.solver_contacts.iter_mut() {
@@ -30,9 +37,8 @@ impl PhysicsHooks for OpposeSlip {
             if slip.length_squared() < 1e-12 {
                 continue;
             }
-            let response = |along: Vector| {
-                [first, second].into_iter().flatten().map(|body| response(body, point, along)).sum::<Vector>()
-            };
+            let response =
+                |along: Vector| free.into_iter().flatten().map(|body| response(body, point, along)).sum::<Vector>();
             // Two orthogonal tangents give K's trace; K v follows from linearity.
             let across = normal.cross(slip);
             let k_slip = response(slip);
@@ -44,11 +50,8 @@ impl PhysicsHooks for OpposeSlip {
     }
 }
 
-/// Velocity that a unit impulse `along` at `point` gives to that point of the body.
+/// Velocity that a unit impulse `along` at `point` gives to that point of a free body.
 fn response(body: &RigidBody, point: Vector, along: Vector) -> Vector {
-    if !body.is_dynamic() {
-        return Vector::ZERO;
-    }
     let mass = body.mass_properties();
     let arm = point - mass.world_com;
     let turn = mass.effective_world_inv_inertia * arm.cross(along);

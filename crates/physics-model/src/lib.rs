@@ -24,6 +24,7 @@
 //! All quantities are SI; vectors are in the base frame of the robot, z up, unless their name says otherwise.
 
 pub mod action;
+mod arm;
 pub mod config;
 mod contact;
 pub mod effect;

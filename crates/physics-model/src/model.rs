@@ -7,7 +7,7 @@ use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng
 use serde::{Deserialize, Serialize};
 
 use crate::action::{Action, minimum_jerk};
-use crate::config::{ForceSensing, PushConfig};
+use crate::config::{ArmConfig, ForceSensing, PushConfig};
 use crate::effect::{Effect, EffectConfig};
 use crate::error::Impossible;
 use crate::feasible::{check_overlaps, check_theta, nothing_happens, parts_in_reach};
@@ -73,6 +73,8 @@ struct End {
     object: BodyState,
     obstacle: Option<BodyState>,
     tool_m: [f64; 3],
+    /// Where a dynamic arm ended, rad.
+    arm_joints_rad: Option<Vec<f64>>,
 }
 
 /// The simulator G(s, a | Θ) of the pushing task.
@@ -200,8 +202,9 @@ impl PushModel {
         report.events.out_of_reach = goal_joints.is_none();
 
         let course = Course { tool, target_m: if goal_joints.is_some() { target } else { start } };
-        let mut sensor = self.force_sensor(&particle.state.joints_rad, goal_joints.as_deref(), start, target);
-        let end = self.simulate(particle, &course, &mut sensor, &mut report);
+        let path = self.joint_path(&particle.state.joints_rad, goal_joints.as_deref(), start, target);
+        let mut sensor = self.force_sensor(path);
+        let end = self.simulate(particle, &course, path.as_ref(), &mut sensor, &mut report);
 
         if report.divergence.is_some() {
             // The state stays as it was, so that nothing downstream meets a value that is not finite.
@@ -212,7 +215,9 @@ impl PushModel {
         let before = particle.state.object.position_m;
         particle.state.object = end.object;
         particle.state.obstacle = end.obstacle;
-        if let Some(joints) = goal_joints {
+        if let Some(joints) = end.arm_joints_rad {
+            particle.state.joints_rad = joints;
+        } else if let Some(joints) = goal_joints {
             // A move that was stopped early ends on the way to its target.
             particle.state.joints_rad = if report.events.large_force {
                 self.joints_for(&particle.state.joints_rad, end.tool_m).unwrap_or(joints)
@@ -237,6 +242,7 @@ impl PushModel {
         &self,
         particle: &Particle,
         course: &Course,
+        path: Option<&JointPath>,
         sensor: &mut ForceSensor,
         report: &mut ActionReport,
     ) -> End {
@@ -268,9 +274,18 @@ impl PushModel {
                     let (theta, obstacle) = (&particle.theta, obstacle.as_ref());
                     let shapes = self.robot.tool_shapes();
                     let shapes = parts_in_reach(world_config, theta, &object, obstacle, &tool, target, shapes);
-                    World::restore(world_config, &self.effects, theta, &object, obstacle, &tool, &shapes)
+                    let world = World::restore(world_config, &self.effects, theta, &object, obstacle, &tool, &shapes);
+                    match &self.config.arm {
+                        ArmConfig::Kinematic => world,
+                        ArmConfig::Dynamic(servo) => {
+                            world.with_dynamic_arm(&self.robot, servo, &particle.state.joints_rad)
+                        }
+                    }
                 });
-                let wrench = world.step(position);
+                let wrench = match (&self.config.arm, path) {
+                    (ArmConfig::Dynamic(_), Some(path)) => world.step_arm(path.stopped(share).position_rad()),
+                    _ => world.step(position),
+                };
                 report.tool_touched |= wrench.force_magnitude_n() > 0.0;
                 report.obstacle_touched |= world.obstacle_touched();
                 wrench
@@ -295,6 +310,7 @@ impl PushModel {
                 ended = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, end);
             }
         }
+        let mut arm_joints_rad = None;
         match &world {
             None => {
                 for body in std::iter::once(&mut object).chain(&mut obstacle) {
@@ -304,7 +320,11 @@ impl PushModel {
             }
             Some(world) => {
                 (object, obstacle) = (world.object(), world.obstacle());
-                let tool = ToolPose { position_m: position, ..course.tool };
+                arm_joints_rad = world.arm_joints_rad();
+                let tool = match &arm_joints_rad {
+                    Some(joints) => self.tool_pose(joints),
+                    None => ToolPose { position_m: position, ..course.tool },
+                };
                 let shapes = self.robot.tool_shapes();
                 report.divergence = world.divergence().or_else(|| {
                     check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &tool, shapes)
@@ -313,7 +333,7 @@ impl PushModel {
                 });
             }
         }
-        End { object, obstacle, tool_m: position }
+        End { object, obstacle, tool_m: position, arm_joints_rad }
     }
 
     fn is_quiet(
@@ -325,7 +345,9 @@ impl PushModel {
         target_m: [f64; 3],
     ) -> bool {
         let shapes = self.robot.tool_shapes();
-        self.level && nothing_happens(&self.config.world, theta, object, obstacle, tool, target_m, shapes)
+        // A dynamic arm does not follow its path exactly.
+        let exact = self.config.arm == ArmConfig::Kinematic;
+        exact && self.level && nothing_happens(&self.config.world, theta, object, obstacle, tool, target_m, shapes)
     }
 
     fn tool_pose(&self, joints_rad: &[f64]) -> ToolPose {
@@ -334,15 +356,16 @@ impl PushModel {
         ToolPose { position_m: base_from_tool.translation.vector.into(), orientation: [q.i, q.j, q.k, q.w] }
     }
 
-    /// A sensor for the move of the tool from `start_m` to `target_m`, or for none.
-    fn force_sensor(
+    /// The joints' way while the tool moves from `start_m` to `target_m`, or rests; `None` where neither the arm nor its sensor asks for it.
+    fn joint_path(
         &self,
         start_rad: &[f64],
         end_rad: Option<&[f64]>,
         start_m: [f64; 3],
         target_m: [f64; 3],
-    ) -> ForceSensor<'_> {
-        let path = ForceSensor::needs_path(&self.config.sensor).then(|| match end_rad {
+    ) -> Option<JointPath> {
+        let dynamic = matches!(self.config.arm, ArmConfig::Dynamic(_));
+        (dynamic || ForceSensor::needs_path(&self.config.sensor)).then(|| match end_rad {
             None => JointPath::resting(start_rad),
             Some(end_rad) => {
                 let middle_m = std::array::from_fn(|i| 0.5 * (start_m[i] + target_m[i]));
@@ -352,7 +375,11 @@ impl PushModel {
                 });
                 JointPath::through(start_rad, &middle_rad, end_rad)
             }
-        });
+        })
+    }
+
+    fn force_sensor(&self, path: Option<JointPath>) -> ForceSensor<'_> {
+        let path = path.filter(|_| ForceSensor::needs_path(&self.config.sensor));
         ForceSensor::new(&self.robot, &self.config.sensor, path)
     }
 }

@@ -13,11 +13,12 @@ use rapier3d::prelude::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ObstacleMobility, WorldConfig};
+use crate::arm::Arm;
+use crate::config::{ObstacleMobility, ServoConfig, WorldConfig};
 use crate::contact::{lowest_point, table_wrench, tool_wrench, touches};
 use crate::effect::{BodyView, Effect, Load, Surroundings};
 use crate::friction::OpposeSlip;
-use crate::robot::ToolShape;
+use crate::robot::{Robot, ToolShape};
 use crate::state::BodyState;
 use crate::theta::{ObjectShape, Theta};
 
@@ -95,6 +96,7 @@ pub struct World<'a> {
     tool_lowest: Vector,
     object: Body,
     obstacle: Option<Body>,
+    arm: Option<Arm<'a>>,
 }
 
 impl<'a> World<'a> {
@@ -176,7 +178,20 @@ impl<'a> World<'a> {
             tool_lowest: lowest_point(tool, tool_shapes),
             object: object_body,
             obstacle: obstacle_body,
+            arm: None,
         }
+    }
+
+    /// The same world with the tool on a dynamic arm, at rest at `joints_rad`, which must be those of the tool's pose. Only for a
+    /// world that has not made a step.
+    ///
+    /// # Panics
+    ///
+    /// If `joints_rad` has not one value per joint.
+    #[must_use]
+    pub fn with_dynamic_arm(mut self, robot: &'a Robot, servo: &ServoConfig, joints_rad: &[f64]) -> Self {
+        self.arm = Some(Arm::new(&mut self.physics, self.tool, robot, servo, joints_rad));
+        self
     }
 
     /// Advances one control step, at whose end the tool is at `position_m` (base frame); its orientation stays.
@@ -185,11 +200,42 @@ impl<'a> World<'a> {
         self.apply_effects();
         self.physics.bodies[self.tool].set_next_kinematic_translation(vector(position_m));
         self.physics.step_with_events(&OpposeSlip, &());
-        let physics = &self.physics;
-        let mut wrench =
-            tool_wrench(self.config, &physics.narrow_phase, &physics.colliders, &self.tool_colliders, position_m);
+        let mut wrench = self.tool_wrench(position_m, self.config.arm_stiffness_npm);
         wrench.add_scaled(&table_wrench(self.config, position_m, self.tool_lowest), 1.0);
         wrench
+    }
+
+    /// Advances one control step, at whose end the dynamic arm's joints are commanded to be at `joints_rad`. Returns the mean wrench on
+    /// the tool during the step, about the centre that the tool has then.
+    ///
+    /// # Panics
+    ///
+    /// In a world without a dynamic arm.
+    pub fn step_arm(&mut self, joints_rad: &[f64]) -> Wrench {
+        self.apply_effects();
+        let arm = self.arm.as_mut().expect("a world with a dynamic arm");
+        arm.command(&mut self.physics, joints_rad);
+        self.physics.step_with_events(&OpposeSlip, &());
+        // This arm's stiffness is that of its servos.
+        self.tool_wrench(self.tool_position_m(), 0.0)
+    }
+
+    fn tool_wrench(&self, center_m: [f64; 3], stiffness_npm: f64) -> Wrench {
+        let (physics, period_secs) = (&self.physics, self.config.control_period_secs);
+        let tool = &self.tool_colliders;
+        tool_wrench(&physics.narrow_phase, &physics.colliders, tool, center_m, period_secs, stiffness_npm)
+    }
+
+    /// Joint positions of the dynamic arm, rad.
+    #[must_use]
+    pub fn arm_joints_rad(&self) -> Option<Vec<f64>> {
+        self.arm.as_ref().map(|arm| arm.joints_rad(&self.physics))
+    }
+
+    /// Where the tool centre is, m, base frame.
+    #[must_use]
+    pub fn tool_position_m(&self) -> [f64; 3] {
+        array(self.physics.bodies[self.tool].translation())
     }
 
     /// State of the object.
@@ -208,6 +254,9 @@ impl<'a> World<'a> {
     /// [`crate::feasible::check_overlaps`].
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
+        if self.arm_joints_rad().is_some_and(|joints| joints.iter().any(|v| !v.is_finite())) {
+            return Some(Divergence::NotFinite);
+        }
         for body in std::iter::once(&self.object).chain(&self.obstacle) {
             let state = self.body_state(body);
             if !state.to_array().iter().all(|v| v.is_finite()) {

@@ -44,8 +44,9 @@ impl Problem {
                 problem: format!("sensor.force: joint_torques expects an arm of 3 to 6 joints, this one has {joints}"),
             });
         }
-        let truth = PushModel::new(scenario.push_config(&scenario.effects.truth), Arc::clone(&robot));
-        let model = PushModel::new(scenario.push_config(&scenario.effects.model), robot);
+        let (arm, effects) = (&scenario.arm, &scenario.effects);
+        let truth = PushModel::new(scenario.push_config(&arm.truth, &effects.truth), Arc::clone(&robot));
+        let model = PushModel::new(scenario.push_config(&arm.model, &effects.model), robot);
         let start = scenario.task.tool_start_m;
         let start_joints_rad = truth.joints_for(&scenario.robot.home_rad, start).ok_or_else(|| Error::Task {
             name: scenario.name.clone(),

@@ -21,6 +21,6 @@ pub use error::Error;
 pub use load::{Selection, find_root};
 pub use provenance::commit;
 pub use schema::{
-    AgentConfig, DataConfig, EffectsConfig, EvaluationConfig, InitialBeliefConfig, InitialObstacle, Published,
-    Scenario, VERSION,
+    AgentConfig, ArmsConfig, DataConfig, EffectsConfig, EvaluationConfig, InitialBeliefConfig, InitialObstacle,
+    Published, Scenario, VERSION,
 };

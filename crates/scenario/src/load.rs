@@ -255,6 +255,20 @@ mod tests {
     }
 
     #[test]
+    fn the_true_arm_can_be_dynamic_while_the_model_stays_kinematic() {
+        use physics_model::config::{ArmConfig, ServoConfig};
+        let set = |text: &str| load(|s| s.set = vec![text.into()]);
+        let arm = set("arm.truth={ dynamic = { stiffness_nmprad = 3000.0, damping_ratio = 0.7 } }").unwrap().arm;
+        assert_eq!(arm.truth, ArmConfig::Dynamic(ServoConfig { stiffness_nmprad: 3000.0, damping_ratio: 0.7 }));
+        assert_eq!(arm.model, ArmConfig::Kinematic);
+        let soft =
+            set("arm.truth={ dynamic = { stiffness_nmprad = 0.0, damping_ratio = 0.7 } }").unwrap_err().to_string();
+        assert!(soft.contains("arm.truth.dynamic.stiffness_nmprad") && soft.contains("N·m/rad"), "{soft}");
+        let unknown = set("arm.truth={ dynamic = { stiffness = 1.0 } }").unwrap_err().to_string();
+        assert!(unknown.contains("stiffness_nmprad"), "{unknown}");
+    }
+
+    #[test]
     fn errors_name_file_key_and_expectation() {
         let message = |set: &str| load(|s| s.set = vec![set.into()]).unwrap_err().to_string();
         let unknown = message("task.horizn=3");

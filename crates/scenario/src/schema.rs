@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use physics_model::WorldDistribution;
-use physics_model::config::{ObstacleMobility, PerturbConfig, PushConfig, SensorConfig, TaskConfig, WorldConfig};
+use physics_model::config::{
+    ArmConfig, ObstacleMobility, PerturbConfig, PushConfig, SensorConfig, TaskConfig, WorldConfig,
+};
 use physics_model::effect::EffectConfig;
 use physics_model::robot::RobotConfig;
 use serde::{Deserialize, Serialize};
@@ -28,6 +30,8 @@ pub struct Scenario {
     pub robot: RobotConfig,
     /// Time base, contacts, materials.
     pub world: WorldConfig,
+    /// Arms of the true world and of the model, apart.
+    pub arm: ArmsConfig,
     /// Effects of the true world and of the model, apart.
     pub effects: EffectsConfig,
     /// Task.
@@ -50,6 +54,16 @@ pub struct Scenario {
     pub data: DataConfig,
     /// Trials.
     pub evaluation: EvaluationConfig,
+}
+
+/// How the arm follows its commands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArmsConfig {
+    /// In the true world.
+    pub truth: ArmConfig,
+    /// In the model that plans and filters.
+    pub model: ArmConfig,
 }
 
 /// Effects beyond rigid bodies with Coulomb friction.
@@ -122,11 +136,12 @@ pub struct EvaluationConfig {
 }
 
 impl Scenario {
-    /// Everything that turns (s, Θ, action) into a transition, with the given effects.
+    /// Everything that turns (s, Θ, action) into a transition, with the given arm and effects.
     #[must_use]
-    pub fn push_config(&self, effects: &[EffectConfig]) -> PushConfig {
+    pub fn push_config(&self, arm: &ArmConfig, effects: &[EffectConfig]) -> PushConfig {
         PushConfig {
             world: self.world.clone(),
+            arm: arm.clone(),
             task: self.task.clone(),
             sensor: self.sensor.clone(),
             perturb: self.perturb.clone(),
@@ -204,6 +219,8 @@ impl Scenario {
         let period = w.control_period_secs;
         let effects = self.effects.truth.iter().chain(&self.effects.model);
         check(self.version == VERSION, "version", &format!("{VERSION}"), &self.version)
+            .or_else(|| self.arm.truth.problem().map(|p| format!("arm.truth.{p}")))
+            .or_else(|| self.arm.model.problem().map(|p| format!("arm.model.{p}")))
             .or_else(|| effects.clone().find_map(|effect| effect.problem().map(|p| format!("effects: {p}"))))
             .or_else(|| {
                 check(

@@ -8,6 +8,7 @@
 //! - Slices of joints have one entry per actuated joint, in the order of [`RobotConfig::actuated_joints`]; vectors that come back have
 //!   [`MAX_JOINTS`](crate::state::MAX_JOINTS) places, 0 where the arm has no joint.
 
+mod bodies;
 mod chain;
 mod config;
 mod dynamics;
@@ -26,6 +27,7 @@ pub use error::{IkError, RobotError};
 pub use ik::IkOptions;
 pub use shapes::ToolShape;
 
+pub(crate) use bodies::ArmBody;
 use chain::{Chain, Frame, Posture};
 
 /// A link of one [`Robot`]; see [`Robot::frame`].

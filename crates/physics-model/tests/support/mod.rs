@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use physics_model::config::{
-    ForceSensing, GoalConfig, NoiseConfig, ObstacleMobility, PerturbConfig, ReachConfig, RewardConfig, SensorConfig,
-    TaskConfig, WorldConfig,
+    ArmConfig, ForceSensing, GoalConfig, NoiseConfig, ObstacleMobility, PerturbConfig, ReachConfig, RewardConfig,
+    SensorConfig, TaskConfig, WorldConfig,
 };
 use physics_model::robot::{Robot, RobotConfig};
 use physics_model::{PushConfig, PushModel};
@@ -39,6 +39,7 @@ pub(crate) fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f6
             restitution: 0.0,
             obstacle_mobility: mobility,
         },
+        arm: ArmConfig::Kinematic,
         task: TaskConfig {
             horizon: 30,
             discount: 0.95,
