@@ -18,9 +18,11 @@ const RESTING_SPIN_RPS: f64 = 0.02;
 /// Height over the resting height, m, and squared x–y part of the quaternion (2° of tilt) of a body that stands on the table.
 const RESTING_HEIGHT_M: f64 = 0.001;
 const RESTING_TILT_SQUARED: f64 = 3e-4;
+/// Horizontal distance, m, of a resting sphere's centre of mass from its centre: what rolling resistance holds.
+const RESTING_COM_M: f64 = 0.002;
 /// Distance, m, at which the tool passes clear of a body.
 const CLEARANCE_M: f32 = 0.002;
-/// How far, m, a body may get in an action towards a part of the tool that does not push it: a move is 2 cm.
+/// How far, m, a body at rest may get in an action towards a part of the tool that does not push it: a move is 2 cm.
 const BODY_REACH_M: f32 = 0.04;
 
 /// Whether nothing can happen while the tool moves in a straight line from `tool` to `target_m`: every body stands upright at rest and the
@@ -36,29 +38,36 @@ pub fn nothing_happens(
     target_m: [f64; 3],
     tool_shapes: &[ToolShape],
 ) -> bool {
-    let rests = |shape: ObjectShape, size_m: [f64; 3], body: &BodyState| {
-        let speed = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
-        let [x, y, _, _] = body.orientation;
-        let upright = shape == ObjectShape::Sphere || x * x + y * y < RESTING_TILT_SQUARED;
-        let height_m = body.position_m[2] - config.table_height_m - shape.half_height_m(size_m);
-        speed(body.linear_mps) < RESTING_SPEED_MPS
-            && speed(body.angular_rps) < RESTING_SPIN_RPS
-            && upright
-            && height_m.abs() < RESTING_HEIGHT_M
-    };
     let clear = |shape: ObjectShape, size_m: [f64; 3], body: &BodyState| {
         let bounds = body_bounds(shape, size_m, body);
         tool_shapes.iter().all(|part| apart(&swept_bounds(part, tool, target_m), &bounds, CLEARANCE_M))
     };
-    let quiet = |shape, size_m, body: &BodyState| rests(shape, size_m, body) && clear(shape, size_m, body);
     let obstacle_quiet = match (&theta.obstacle, obstacle) {
         (Some(o), Some(body)) => {
             let moves = config.obstacle_mobility == ObstacleMobility::Movable;
-            (!moves || rests(o.shape, o.size_m, body)) && clear(o.shape, o.size_m, body)
+            (!moves || rests(config, o.shape, o.size_m, [0.0; 3], body)) && clear(o.shape, o.size_m, body)
         }
         _ => true,
     };
-    obstacle_quiet && quiet(theta.object.shape, theta.object.size_m, object)
+    let o = &theta.object;
+    obstacle_quiet && rests(config, o.shape, o.size_m, o.com_m, object) && clear(o.shape, o.size_m, object)
+}
+
+/// Whether a body stands upright on the table, at rest.
+fn rests(config: &WorldConfig, shape: ObjectShape, size_m: [f64; 3], com_m: [f64; 3], body: &BodyState) -> bool {
+    let speed = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let [x, y, _, _] = body.orientation;
+    let upright = if shape == ObjectShape::Sphere {
+        let com = pose([0.0; 3], body.orientation).transform_vector(vector(com_m));
+        com.x.hypot(com.y) < RESTING_COM_M as f32
+    } else {
+        x * x + y * y < RESTING_TILT_SQUARED
+    };
+    let height_m = body.position_m[2] - config.table_height_m - shape.half_height_m(size_m);
+    speed(body.linear_mps) < RESTING_SPEED_MPS
+        && speed(body.angular_rps) < RESTING_SPIN_RPS
+        && upright
+        && height_m.abs() < RESTING_HEIGHT_M
 }
 
 /// The parts of the tool that can touch anything while it moves in a straight line to `target_m`: those that come near a body, or the
@@ -73,6 +82,17 @@ pub fn parts_in_reach(
     target_m: [f64; 3],
     tool_shapes: &[ToolShape],
 ) -> Vec<ToolShape> {
+    // A body that moves or tips may come from anywhere: a loaded sphere gains speed as it rolls.
+    let moves = config.obstacle_mobility == ObstacleMobility::Movable;
+    let obstacle_rests = theta
+        .obstacle
+        .as_ref()
+        .zip(obstacle)
+        .is_none_or(|(o, body)| !moves || rests(config, o.shape, o.size_m, [0.0; 3], body));
+    let o = &theta.object;
+    if !(obstacle_rests && rests(config, o.shape, o.size_m, o.com_m, object)) {
+        return tool_shapes.to_vec();
+    }
     let object = body_bounds(theta.object.shape, theta.object.size_m, object);
     let obstacle = theta.obstacle.as_ref().zip(obstacle).map(|(o, body)| body_bounds(o.shape, o.size_m, body));
     let table_m = config.table_height_m as f32 + CLEARANCE_M;

@@ -6,7 +6,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 use crate::config::PerturbConfig;
 use crate::model::Particle;
 use crate::state::BodyState;
-use crate::theta::ObjectShape;
+use crate::theta::{ObjectShape, standard_com_m};
 
 /// Smallest size and mass that noise may lead to.
 const SMALLEST_SIZE_M: f64 = 0.01;
@@ -31,6 +31,7 @@ pub(crate) fn perturb(config: &PerturbConfig, table_height_m: f64, particle: &mu
         };
         *com = (*com + normal(config.com_m, rng)).clamp(-0.9 * half, 0.9 * half);
     }
+    o.com_m = standard_com_m(o.shape, o.com_m);
     noisy_body(config, &mut particle.state.object, rng);
     if resting {
         particle.state.object.position_m[2] = table_height_m + o.shape.half_height_m(o.size_m);

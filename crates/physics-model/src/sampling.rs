@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF as _, Normal};
 
 use crate::model::{Particle, PushModel};
 use crate::state::{BodyState, State};
-use crate::theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta};
+use crate::theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta, standard_com_m};
 
 /// Drawn masses are kept in these ranges, kg: a Gamma distribution has no largest value, and the solver no use for a gram.
 const OBJECT_MASS_KG: [f64; 2] = [0.02, 20.0];
@@ -221,6 +221,7 @@ impl WorldDistribution {
             ObjectShape::Sphere => [2.0 * size_m[0]; 3],
         };
         let com_m = std::array::from_fn(|axis| com[axis].clamp(-extent[axis] / 4.0, extent[axis] / 4.0));
+        let com_m = standard_com_m(shape, com_m);
         let friction = d.friction.sample(rng);
         let position = [d.x_m.sample(rng), d.y_m.sample(rng), table_height_m + shape.half_height_m(size_m)];
         let object = BodyState::at_rest(position, d.yaw_rad.sample(rng));

@@ -47,8 +47,9 @@ impl BodyState {
         let mut orientation = [values[3], values[4], values[5], values[6]];
         let norm = orientation.iter().map(|v| v * v).sum::<f64>().sqrt();
         if norm > 1e-9 {
-            // A unit quaternion stays as it is, bit for bit, so that states survive a write and a read.
-            if (norm - 1.0).abs() > 1e-12 {
+            // A unit quaternion stays as it is, bit for bit, so that states survive a write and a read. Those of the engine are unit to
+            // single precision.
+            if (norm - 1.0).abs() > 1e-5 {
                 orientation = orientation.map(|v| v / norm);
             }
         } else {

@@ -78,6 +78,16 @@ pub const fn obstacle_class(shape: Option<ObjectShape>) -> usize {
 /// Class index of "no obstacle".
 pub const NO_OBSTACLE: usize = 3;
 
+/// The centre of mass `com_m` in the frame of its shape. A sphere looks the same in every frame; the one is taken in which the centre of mass
+/// lies below the centre, so that a sphere in its frame is at rest and does not start to roll by its own weight.
+#[must_use]
+pub fn standard_com_m(shape: ObjectShape, com_m: [f64; 3]) -> [f64; 3] {
+    match shape {
+        ObjectShape::Box | ObjectShape::Cylinder => com_m,
+        ObjectShape::Sphere => [0.0, 0.0, -com_m[2].abs()],
+    }
+}
+
 /// Parameters of the target object.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -86,7 +96,8 @@ pub struct ObjectTheta {
     pub shape: ObjectShape,
     /// Mass, kg.
     pub mass_kg: f64,
-    /// Centre of mass relative to the centre of the shape, m, in the object's frame.
+    /// Centre of mass relative to the centre of the shape, m, in the object's frame. That of a sphere is turned so that the centre of mass
+    /// lies on its −z axis (see [`standard_com_m`]).
     pub com_m: [f64; 3],
     /// Coulomb friction coefficient with the table, in [0, 1].
     pub friction: f64,
@@ -166,6 +177,7 @@ impl Theta {
     #[must_use]
     pub fn applies(&self) -> [bool; THETA_LEN] {
         let mut applies = [true; THETA_LEN];
+        applies[1..3].fill(self.object.shape != ObjectShape::Sphere);
         for (i, flag) in applies[5..8].iter_mut().enumerate() {
             *flag = i < self.object.shape.size_count();
         }
@@ -199,7 +211,7 @@ impl Theta {
             object: ObjectTheta {
                 shape,
                 mass_kg: values[0],
-                com_m: [values[1], values[2], values[3]],
+                com_m: standard_com_m(shape, [values[1], values[2], values[3]]),
                 friction: values[4],
                 size_m: sizes(shape, &values[5..8]),
             },

@@ -127,6 +127,7 @@ impl<'a> World<'a> {
         parameters.max_ccd_substeps = 0;
         // The size of the things that are pushed: with rapier's metre, pairs are looked into from 8 cm apart, at a quarter more time.
         parameters.length_unit = 0.1;
+        parameters.normalized_max_corrective_velocity *= 10.0;
         let softness = SpringCoefficients {
             natural_frequency: config.contact_frequency_hz as f32,
             damping_ratio: config.contact_damping_ratio as f32,
