@@ -171,8 +171,8 @@ mod tests {
         let count = |classes| sequence(&episode(classes)).mask.iter().sum::<f32>() / 2.0;
         // 7 joints, 13 object, 5 + 3 of a box, 13 obstacle, 1 + 2 of a cylinder.
         assert_eq!(count([0, 1]), 7.0 + 13.0 + 8.0 + 13.0 + 3.0);
-        // Sphere without obstacle.
-        assert_eq!(count([2, 3]), 7.0 + 13.0 + 6.0);
+        // Sphere without obstacle: mass, depth of the centre of mass, friction, radius.
+        assert_eq!(count([2, 3]), 7.0 + 13.0 + 4.0);
     }
 
     #[test]
