@@ -15,6 +15,6 @@ pub mod seed;
 pub use belief::{Belief, UpdateReport, Updater};
 pub use episode::{Transition, discounted_return};
 pub use model::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Step};
-pub use policy::{Policy, UniformPolicy};
+pub use policy::{ActionPrior, Policy, UniformPolicy};
 pub use prior::{Density, Prior};
 pub use seed::{Purpose, Rng, Seed};

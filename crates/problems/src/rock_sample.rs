@@ -1,0 +1,500 @@
+//! RockSample(n, k): a rover among rocks of which some are worth sampling (Smith and Simmons, "Heuristic search value iteration for
+//! POMDPs", UAI 2004; γ = 0.95), with the layouts of POMCP 1.0.
+//!
+//! Moves are certain. Leaving by the east edge pays +10 and ends the episode; a move over another edge costs 100 and does nothing.
+//! Sampling pays +10 for a good rock and −10 for a bad one, and makes it bad; where there is no rock it costs 100. Checking a rock at
+//! Euclidean distance d (in cells) tells its kind rightly with probability (1 + 2^(−d/20)) / 2.
+
+use pomdp::{ActionPrior, Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Policy, Rng, Step};
+use rand::RngExt as _;
+
+use crate::InitialState;
+use crate::bits::{Actions, Advice, Knowledge};
+
+/// γ.
+pub const DISCOUNT: f64 = 0.95;
+/// Distance, in cells, at which what a check tells beyond chance has halved.
+const HALF_DISTANCE: f64 = 20.0;
+const MOST_ROCKS: usize = 16;
+/// First check among the actions.
+const CHECK: usize = 5;
+const SAMPLE: Actions = Actions(1 << 4);
+const EAST: Actions = Actions(1 << 1);
+
+/// What can be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// y + 1.
+    North,
+    /// x + 1; from the last column, out.
+    East,
+    /// y − 1.
+    South,
+    /// x − 1.
+    West,
+    /// Sample the rock here.
+    Sample,
+    /// Look at a rock from here.
+    Check(u8),
+}
+
+/// What is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Observation {
+    /// Nothing was checked.
+    Nothing,
+    /// The rock looks good.
+    Good,
+    /// The rock looks bad.
+    Bad,
+}
+
+/// Where the rover is, how the rocks are, and what it saw of them. The last is a function of the history, so it is equal in all
+/// states of a belief; it is carried so that policies need no history.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct State {
+    cell: u8,
+    /// Bit per rock.
+    good: u16,
+    sampled: u16,
+    seen: Seen,
+}
+
+/// What was measured, a bit or a number per rock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Seen {
+    /// Good minus bad observations.
+    balance: [i8; MOST_ROCKS],
+    checks: [u8; MOST_ROCKS],
+    /// Rocks with more good than bad observations, and with more bad than good ones.
+    liked: u16,
+    disliked: u16,
+    /// Rocks that were checked from their own cell, where a check is never wrong.
+    certain: u16,
+    /// Rocks that need no further check: certain ones, and those with 5 checks or a balance of 2 either way.
+    settled: u16,
+}
+
+/// The problem.
+#[derive(Clone, Debug)]
+pub struct RockSample {
+    size: u8,
+    start: u8,
+    rocks: Vec<[u8; 2]>,
+    actions: Vec<Action>,
+    /// Rock in each cell.
+    rock_at: Vec<Option<u8>>,
+    /// Probability of a right check, by cell and rock.
+    accuracy: Vec<f64>,
+    /// Rocks to the north, east, south and west of each cell.
+    towards: Vec<[u16; 4]>,
+}
+
+impl RockSample {
+    /// RockSample(7, 8) as in POMCP 1.0.
+    #[must_use]
+    pub fn standard_7_8() -> Self {
+        Self::new(7, [0, 3], &[[2, 0], [0, 1], [3, 1], [6, 3], [2, 4], [3, 4], [5, 5], [1, 6]])
+    }
+
+    /// RockSample(11, 11) as in POMCP 1.0.
+    #[must_use]
+    pub fn standard_11_11() -> Self {
+        let rocks =
+            [[0, 3], [0, 7], [1, 8], [2, 4], [3, 3], [3, 8], [4, 3], [5, 8], [6, 1], [9, 3], [9, 9]];
+        Self::new(11, [0, 5], &rocks)
+    }
+
+    /// A square of `size` cells a side with rocks at (x, y), y growing to the north.
+    ///
+    /// # Panics
+    ///
+    /// With more than 15 cells a side or 16 rocks, or with a rock or the start outside, or two rocks in one cell.
+    #[must_use]
+    pub fn new(size: u8, start: [u8; 2], rocks: &[[u8; 2]]) -> Self {
+        assert!((1..=15).contains(&size), "size {size} is not between 1 and 15");
+        assert!(rocks.len() <= MOST_ROCKS, "{} rocks are more than {MOST_ROCKS}", rocks.len());
+        let inside = |p: &[u8; 2]| p[0] < size && p[1] < size;
+        assert!(inside(&start) && rocks.iter().all(inside), "a rock or the start lies outside");
+        let checks = (0..rocks.len()).map(|rock| Action::Check(rock as u8));
+        let moves = [Action::North, Action::East, Action::South, Action::West, Action::Sample];
+        let cells: Vec<[u8; 2]> = (0..size * size).map(|cell| [cell % size, cell / size]).collect();
+        let mut rock_at = vec![None; cells.len()];
+        for (rock, place) in rocks.iter().enumerate() {
+            let here = &mut rock_at[usize::from(place[1] * size + place[0])];
+            assert!(here.is_none(), "two rocks in cell {place:?}");
+            *here = Some(rock as u8);
+        }
+        let accuracy = |from: &[u8; 2], rock: &[u8; 2]| {
+            let distance = (f64::from(from[0]) - f64::from(rock[0])).hypot(f64::from(from[1]) - f64::from(rock[1]));
+            (1.0 + (-distance / HALF_DISTANCE).exp2()) / 2.0
+        };
+        let where_rocks = |holds: &dyn Fn(&[u8; 2]) -> bool| {
+            rocks.iter().enumerate().filter(|(_, r)| holds(r)).fold(0_u16, |bits, (index, _)| bits | 1 << index)
+        };
+        let towards = |c: &[u8; 2]| {
+            [
+                where_rocks(&|r| r[1] > c[1]),
+                where_rocks(&|r| r[0] > c[0]),
+                where_rocks(&|r| r[1] < c[1]),
+                where_rocks(&|r| r[0] < c[0]),
+            ]
+        };
+        Self {
+            size,
+            start: start[1] * size + start[0],
+            rocks: rocks.to_vec(),
+            actions: moves.into_iter().chain(checks).collect(),
+            accuracy: cells.iter().flat_map(|c| rocks.iter().map(move |r| accuracy(c, r))).collect(),
+            towards: cells.iter().map(towards).collect(),
+            rock_at,
+        }
+    }
+
+    /// The start with rocks of these kinds, of which nothing is known.
+    #[must_use]
+    pub fn state(&self, good: impl Fn(usize) -> bool) -> State {
+        let good = (0..self.rocks.len()).filter(|&rock| good(rock)).fold(0, |bits, rock| bits | 1 << rock);
+        let balance = [0; MOST_ROCKS];
+        let seen = Seen { balance, checks: [0; MOST_ROCKS], liked: 0, disliked: 0, certain: 0, settled: 0 };
+        State { cell: self.start, good, sampled: 0, seen }
+    }
+
+    /// (x, y) of the rover.
+    #[must_use]
+    pub fn place(&self, state: &State) -> [u8; 2] {
+        [state.cell % self.size, state.cell / self.size]
+    }
+
+    fn accuracy(&self, cell: u8, rock: u8) -> f64 {
+        self.accuracy[usize::from(cell) * self.rocks.len() + usize::from(rock)]
+    }
+
+    fn unsampled(&self, state: &State) -> u16 {
+        let all = ((1_u32 << self.rocks.len()) - 1) as u16;
+        all & !state.sampled
+    }
+
+    fn rock_bit(&self, cell: u8) -> u16 {
+        self.rock_at[usize::from(cell)].map_or(0, |rock| 1 << rock)
+    }
+
+    /// Moves that do not leave by a wrong edge, sampling an unsampled rock, checking unsampled rocks: what POMCP 1.0 calls legal.
+    #[must_use]
+    pub fn legal(&self, state: &State) -> Actions {
+        let ([x, y], open) = (self.place(state), self.unsampled(state));
+        let sample = u32::from(open & self.rock_bit(state.cell) != 0) << 4;
+        let moves = u32::from(y + 1 < self.size) | 1 << 1 | u32::from(y > 0) << 2 | u32::from(x > 0) << 3;
+        Actions(moves | sample | u32::from(open) << CHECK)
+    }
+
+    /// What POMCP 1.0 prefers: sample a rock that looks good; go east when all rocks left look bad; else move towards a rock that does not
+    /// look bad or check one that is not settled. Empty where nothing of this is possible.
+    #[must_use]
+    #[inline]
+    pub fn preferred(&self, state: &State) -> Actions {
+        let open = self.unsampled(state);
+        if open & state.seen.liked & self.rock_bit(state.cell) != 0 {
+            return SAMPLE;
+        }
+        let interesting = open & !state.seen.disliked;
+        if interesting == 0 {
+            return EAST;
+        }
+        let towards = &self.towards[usize::from(state.cell)];
+        let moves = (0..4).fold(0, |moves, way| moves | u32::from(interesting & towards[way] != 0) << way);
+        Actions(moves | u32::from(open & !state.seen.settled) << CHECK)
+    }
+
+    fn look(&self, state: &mut State, rock: u8, rng: &mut Rng) -> Observation {
+        let (bit, accuracy) = (1_u16 << rock, self.accuracy(state.cell, rock));
+        let good = (state.good & bit != 0) == (rng.random::<f64>() < accuracy);
+        let (seen, index) = (&mut state.seen, usize::from(rock));
+        seen.checks[index] = seen.checks[index].saturating_add(1);
+        seen.balance[index] = seen.balance[index].saturating_add(if good { 1 } else { -1 });
+        let balance = seen.balance[index];
+        seen.liked = if balance > 0 { seen.liked | bit } else { seen.liked & !bit };
+        seen.disliked = if balance < 0 { seen.disliked | bit } else { seen.disliked & !bit };
+        if accuracy == 1.0 {
+            seen.certain |= bit;
+        }
+        // A balance that falls back below 2 makes a rock worth a check again.
+        let settled = seen.certain & bit != 0 || seen.checks[index] >= 5 || balance.abs() >= 2;
+        seen.settled = if settled { seen.settled | bit } else { seen.settled & !bit };
+        if good { Observation::Good } else { Observation::Bad }
+    }
+}
+
+impl GenerativeModel for RockSample {
+    type State = State;
+    type Action = Action;
+    type Observation = Observation;
+
+    fn actions(&self) -> &[Action] {
+        &self.actions
+    }
+
+    #[inline]
+    fn step(&self, state: &mut State, action: &Action, rng: &mut Rng) -> Step<Observation> {
+        let goes_on = |reward| Step { observation: Observation::Nothing, reward, outcome: Outcome::Continue };
+        let [x, y] = self.place(state);
+        let last = self.size - 1;
+        let (inside, to) = match action {
+            Action::Check(rock) => {
+                let observation = self.look(state, *rock, rng);
+                return Step { observation, reward: 0.0, outcome: Outcome::Continue };
+            }
+            Action::Sample => {
+                let bit = self.rock_bit(state.cell);
+                if bit == 0 {
+                    return goes_on(-100.0);
+                }
+                let good = state.good & bit != 0;
+                state.good &= !bit;
+                state.sampled |= bit;
+                return goes_on(if good { 10.0 } else { -10.0 });
+            }
+            Action::East if x == last => {
+                return Step { observation: Observation::Nothing, reward: 10.0, outcome: Outcome::Terminal };
+            }
+            Action::East => (true, state.cell + 1),
+            Action::North => (y < last, state.cell.wrapping_add(self.size)),
+            Action::South => (y > 0, state.cell.wrapping_sub(self.size)),
+            Action::West => (x > 0, state.cell.wrapping_sub(1)),
+        };
+        if !inside {
+            return goes_on(-100.0);
+        }
+        state.cell = to;
+        goes_on(0.0)
+    }
+
+    fn discount(&self) -> f64 {
+        DISCOUNT
+    }
+}
+
+impl ObservationModel for RockSample {
+    fn log_likelihood(&self, action: &Action, next: &State, observation: &Observation) -> f64 {
+        match (action, observation) {
+            (Action::Check(_), Observation::Nothing) => f64::NEG_INFINITY,
+            (Action::Check(rock), seen) => {
+                let accuracy = self.accuracy(next.cell, *rock);
+                let right = (next.good >> rock & 1 == 1) == (*seen == Observation::Good);
+                if right { accuracy.ln() } else { (1.0 - accuracy).ln() }
+            }
+            (_, Observation::Nothing) => 0.0,
+            _ => f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl Discretise for RockSample {
+    type Key = Observation;
+
+    fn key(&self, observation: &Observation) -> Observation {
+        *observation
+    }
+}
+
+impl InitialState for RockSample {
+    fn initial(&self, rng: &mut Rng) -> State {
+        let bits: u16 = rng.random();
+        self.state(|rock| bits >> rock & 1 == 1)
+    }
+}
+
+impl Perturb for RockSample {
+    /// Turns one rock that was not sampled into the other kind: the local move of POMCP 1.0.
+    fn perturb(&self, state: &mut State, rng: &mut Rng) {
+        let open = Actions(u32::from(self.unsampled(state)));
+        if open != Actions::default() {
+            state.good ^= 1 << open.choose(rng);
+        }
+    }
+}
+
+impl Policy<RockSample> for Advice {
+    #[inline]
+    fn action(&self, model: &RockSample, state: &State, rng: &mut Rng) -> Action {
+        let actions = match self.rollout {
+            Knowledge::Pure => return model.actions[rng.random_range(0..model.actions.len())],
+            Knowledge::Legal => model.legal(state),
+            Knowledge::Preferred => match model.preferred(state) {
+                Actions(0) => model.legal(state),
+                some => some,
+            },
+        };
+        model.actions[actions.choose(rng)]
+    }
+
+    fn priors(&self, model: &RockSample, state: &State, priors: &mut [ActionPrior]) {
+        self.write(model.legal(state), model.preferred(state), priors);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pomdp::{Purpose, Seed, conformance};
+
+    use super::*;
+
+    fn rng() -> Rng {
+        Seed(1).stream(Purpose::Test, 0)
+    }
+
+    fn run(problem: &RockSample, state: &mut State, actions: &[Action]) -> Vec<f64> {
+        let mut rng = rng();
+        actions.iter().map(|action| problem.step(state, action, &mut rng).reward).collect()
+    }
+
+    #[test]
+    fn both_layouts_conform() {
+        for problem in [RockSample::standard_7_8(), RockSample::standard_11_11()] {
+            let states: Vec<State> = (0..20).map(|i| problem.initial(&mut Seed(1).stream(Purpose::Test, i))).collect();
+            conformance::check_generative_model(&problem, &states, 60);
+        }
+    }
+
+    #[test]
+    fn the_start_is_as_published_and_every_rock_is_good_half_the_time() {
+        let (small, large) = (RockSample::standard_7_8(), RockSample::standard_11_11());
+        assert_eq!((small.actions().len(), large.actions().len()), (13, 16));
+        assert_eq!(small.place(&small.initial(&mut rng())), [0, 3]);
+        assert_eq!(large.place(&large.initial(&mut rng())), [0, 5]);
+        let mut rng = rng();
+        let mut counts = [0_i32; 8];
+        for _ in 0..2000 {
+            let state = small.initial(&mut rng);
+            (0..8).for_each(|rock| counts[rock] += i32::from(state.good >> rock & 1));
+        }
+        // n = 2000, standard deviation 22.4; tolerance 4 of them.
+        assert!(counts.iter().all(|c| (c - 1000).abs() < 90), "{counts:?}");
+    }
+
+    #[test]
+    fn moves_stay_on_the_grid_and_the_east_edge_pays() {
+        use Action::{East, North, South, West};
+        let problem = RockSample::standard_7_8();
+        let mut state = problem.state(|_| true);
+        assert_eq!(run(&problem, &mut state, &[West, North, North, North, North, East, South]), [
+            -100.0, 0.0, 0.0, 0.0, -100.0, 0.0, 0.0
+        ]);
+        assert_eq!(problem.place(&state), [1, 5]);
+        assert_eq!(run(&problem, &mut state, &[South; 6]), [0.0, 0.0, 0.0, 0.0, 0.0, -100.0]);
+        assert_eq!(run(&problem, &mut state, &[East; 5]), [0.0; 5]);
+        let step = problem.step(&mut state, &East, &mut rng());
+        assert_eq!((step.reward, step.outcome), (10.0, Outcome::Terminal));
+    }
+
+    #[test]
+    fn a_sampled_rock_becomes_bad_and_bare_ground_costs() {
+        use Action::{East, Sample, South};
+        let problem = RockSample::standard_7_8();
+        // Rock 1 at (0, 1), two cells south of the start.
+        let path = [South, South, Sample, Sample, East, Sample];
+        let rewards = |good: bool| run(&problem, &mut problem.state(|rock| good && rock == 1), &path);
+        assert_eq!(rewards(true), [0.0, 0.0, 10.0, -10.0, 0.0, -100.0]);
+        assert_eq!(rewards(false), [0.0, 0.0, -10.0, -10.0, 0.0, -100.0]);
+    }
+
+    #[test]
+    fn checks_are_right_as_often_as_the_distance_allows() {
+        // From (0, 3): rock 3 at (6, 3) is 6 cells off, rock 5 at (3, 4) √10.
+        let problem = RockSample::standard_7_8();
+        let mut rng = rng();
+        for (rock, distance) in [(3_u8, 6.0_f64), (5, 10_f64.sqrt())] {
+            let accuracy = (1.0 + 2_f64.powf(-distance / 20.0)) / 2.0;
+            for good in [true, false] {
+                let state = problem.state(|_| good);
+                let look = |seen| problem.log_likelihood(&Action::Check(rock), &state, &seen).exp();
+                let (right, wrong) =
+                    if good { (Observation::Good, Observation::Bad) } else { (Observation::Bad, Observation::Good) };
+                assert!((look(right) - accuracy).abs() < 1e-12 && (look(right) + look(wrong) - 1.0).abs() < 1e-12);
+                let seen = (0..10_000)
+                    .filter(|_| problem.step(&mut { state }, &Action::Check(rock), &mut rng).observation == right);
+                // Standard deviation √(n p (1 − p)); tolerance 4 of them.
+                let tolerance = 4.0 * (10_000.0 * accuracy * (1.0 - accuracy)).sqrt();
+                assert!((seen.count() as f64 - 10_000.0 * accuracy).abs() < tolerance);
+            }
+        }
+        let nothing = problem.log_likelihood(&Action::North, &problem.state(|_| true), &Observation::Nothing);
+        assert_eq!(nothing, 0.0);
+    }
+
+    fn named(problem: &RockSample, set: Actions) -> Vec<Action> {
+        problem.actions().iter().enumerate().filter(|(i, _)| set.contains(*i)).map(|(_, a)| *a).collect()
+    }
+
+    #[test]
+    fn preferences_follow_what_was_seen() {
+        use Action::{Check, East, North, Sample, South, West};
+        let problem = RockSample::standard_7_8();
+        let mut state = problem.state(|_| true);
+        let all_checks = (0..8).map(Check);
+        let moves = [North, East, South];
+        let expected: Vec<Action> = moves.into_iter().chain(all_checks).collect();
+        assert_eq!(named(&problem, problem.preferred(&state)), expected);
+        assert_eq!(problem.legal(&state), problem.preferred(&state), "no rock here and the west edge at hand");
+        // Rock 1, two cells south: seen good from its own cell, which settles it; then only sampling is preferred.
+        run(&problem, &mut state, &[South, South, Check(1)]);
+        assert_eq!(named(&problem, problem.preferred(&state)), [Sample]);
+        run(&problem, &mut state, &[Sample]);
+        assert!(!problem.legal(&state).contains(4) && !problem.legal(&state).contains(CHECK + 1));
+        // All looked bad: east.
+        state.seen.disliked = u16::MAX;
+        assert_eq!(named(&problem, problem.preferred(&state)), [East]);
+        // One open rock to the west that is settled: only the way there.
+        state.seen.disliked = !1;
+        (state.seen.settled, state.cell) = (u16::MAX, 3);
+        assert_eq!(named(&problem, problem.preferred(&state)), [West]);
+    }
+
+    #[test]
+    fn five_checks_or_a_balance_of_two_settle_a_rock() {
+        let problem = RockSample::standard_7_8();
+        let mut state = problem.state(|_| true);
+        let mut rng = rng();
+        let mut balance: i32 = 0;
+        for count in 1..=5 {
+            balance += match problem.step(&mut state, &Action::Check(3), &mut rng).observation {
+                Observation::Good => 1,
+                _ => -1,
+            };
+            assert_eq!(problem.preferred(&state).contains(CHECK + 3), count < 5 && balance.abs() < 2, "{count} checks");
+        }
+    }
+
+    #[test]
+    fn a_local_move_turns_one_open_rock() {
+        let problem = RockSample::standard_7_8();
+        let mut rng = rng();
+        for _ in 0..100 {
+            let before = State { sampled: 0b11, ..problem.initial(&mut rng) };
+            let mut after = before;
+            problem.perturb(&mut after, &mut rng);
+            let turned = before.good ^ after.good;
+            assert!(turned.count_ones() == 1 && turned & 0b11 == 0 && turned < 256);
+        }
+    }
+
+    #[test]
+    fn rollouts_never_pay_a_fine() {
+        let problem = RockSample::standard_11_11();
+        let mut rng = rng();
+        for rollout in [Knowledge::Legal, Knowledge::Preferred] {
+            let advice = Advice { rollout, ..Advice::default() };
+            for _ in 0..200 {
+                let mut state = problem.initial(&mut rng);
+                for _ in 0..90 {
+                    let action = advice.action(&problem, &state, &mut rng);
+                    let step = problem.step(&mut state, &action, &mut rng);
+                    assert!(step.reward > -100.0, "{action:?}");
+                    if step.outcome == Outcome::Terminal {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+}
