@@ -3,9 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::ucb::ReturnRange;
 
-/// Settings of [`crate::Pomcp`].
+/// Settings of [`crate::Pomcp`] and [`crate::Pomcpow`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Config {
@@ -17,17 +16,33 @@ pub struct Config {
     pub depth: usize,
     /// Length of the rollout below a new leaf.
     pub rollout_depth: RolloutDepth,
+    /// What [`pomdp::Policy::priors`] is asked for.
+    pub action_priors: ActionPriors,
+    /// How observations branch the tree.
+    pub observations: Observations,
+    /// Most nodes of all trees together, at least one a tree. States stored by progressive widening count as nodes. Once they are
+    /// used up nothing is added any more: simulations turn into rollouts where they leave the tree, and
+    /// [`crate::SearchReport::unexpanded`] counts them. Pruning frees nodes.
+    pub nodes: usize,
+    /// Independent trees (root parallelism), which share the budget evenly. Each has its own random stream, drawn from the caller's
+    /// generator; a single tree uses that generator itself. The action is chosen by the merged statistics of their roots.
+    pub trees: usize,
+    /// Threads that simulate the trees, the caller's included. Without influence on the result, unless the budget is a time.
+    pub threads: usize,
 }
 
-/// Work per decision.
+/// Work per decision, of all trees together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Budget {
     /// Exactly this many simulations.
     Simulations(usize),
     /// At most this many transitions of the model. A simulation that could overrun the budget is not started, so up to
-    /// `depth` − 1 transitions stay unused: cutting the last simulation short would bias the value it contributes to.
+    /// `depth` − 1 transitions a tree stay unused: cutting the last simulation short would bias the value it contributes to.
     Transitions(usize),
+    /// Wall-clock time, ms: no simulation starts later, and every tree makes at least one. For live use only, since the same seed
+    /// gives another result on another day.
+    Milliseconds(u64),
 }
 
 /// Constant c of UCB1.
@@ -47,8 +62,37 @@ pub enum Exploration {
 pub enum RolloutDepth {
     /// To the horizon of the simulation, as published.
     Full,
-    /// At most this many actions; what would follow counts as zero.
+    /// At most this many actions; what would follow counts as [`pomdp::Policy::leaf_value`].
     Actions(usize),
+}
+
+/// What a policy is asked for at a new node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ActionPriors {
+    /// Nothing: every action is legal and unvisited.
+    Off,
+    /// Which actions are legal.
+    Legal,
+    /// Legal actions, with initial visits and values.
+    Full,
+}
+
+/// How observations branch the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Observations {
+    /// One branch per class of observations ([`pomdp::Discretise`]): [`crate::Pomcp`].
+    Classes,
+    /// Progressive widening: an action with N visits gets a new branch, with the observation just simulated, while it has at most
+    /// `factor` · N^`exponent` of them; nodes hold states weighted by the likelihood of their observation
+    /// ([`pomdp::ObservationModel`]): [`crate::Pomcpow`].
+    Widening {
+        /// k_o, positive.
+        factor: f64,
+        /// α_o in [0, 1].
+        exponent: f64,
+    },
 }
 
 impl Config {
@@ -58,15 +102,32 @@ impl Config {
     ///
     /// [`Error::Config`] with the key, its value and the limit.
     pub fn validate(&self) -> Result<(), Error> {
-        let depth = self.depth;
+        let (depth, trees) = (self.depth, self.trees);
         require(depth >= 1, "depth", &depth, "at least 1")?;
+        require(trees >= 1, "trees", &trees, "at least 1")?;
+        require(self.threads >= 1, "threads", &self.threads, "at least 1")?;
         match self.budget {
-            Budget::Simulations(n) => require(n >= 1, "budget.simulations", &n, "at least 1"),
-            // Below this not even one simulation fits, and there would be nothing to choose from.
-            Budget::Transitions(n) => {
-                require(n >= depth, "budget.transitions", &n, format!("at least depth = {depth}"))
+            Budget::Simulations(n) => {
+                // Visits are counted in 32 bits, kept ones included.
+                let limit = format!("at least trees = {trees}, at most 2³⁰");
+                require((trees..=1 << 30).contains(&n), "budget.simulations", &n, limit)
             }
+            // Below this not even one simulation a tree fits, and there would be nothing to choose from.
+            Budget::Transitions(n) => {
+                let limit = format!("at least depth × trees = {}", depth.saturating_mul(trees));
+                require(n / trees >= depth, "budget.transitions", &n, limit)
+            }
+            Budget::Milliseconds(n) => require(n >= 1, "budget.milliseconds", &n, "at least 1"),
         }?;
+        let nodes = self.nodes;
+        let limit = format!("at least trees = {trees}, at most 2³²");
+        require(nodes >= trees && nodes as u64 <= 1 << 32, "nodes", &nodes, limit)?;
+        if let Observations::Widening { factor, exponent } = self.observations {
+            let positive = factor.is_finite() && factor > 0.0;
+            require(positive, "observations.widening.factor", &factor, "finite and positive")?;
+            let share = (0.0..=1.0).contains(&exponent);
+            require(share, "observations.widening.exponent", &exponent, "between 0 and 1")?;
+        }
         let (key, value) = match self.exploration {
             Exploration::Fixed(c) => ("exploration.fixed", c),
             Exploration::ReturnRange(factor) => ("exploration.return_range", factor),
@@ -79,23 +140,9 @@ fn require(holds: bool, key: &'static str, value: &dyn ToString, limit: impl Int
     if holds { Ok(()) } else { Err(Error::Config { key, value: value.to_string(), limit: limit.into() }) }
 }
 
-impl Budget {
-    /// Whether one more simulation of at most `depth` transitions fits.
-    pub(crate) fn affords(self, simulations: usize, transitions: usize, depth: usize) -> bool {
-        match self {
-            Self::Simulations(n) => simulations < n,
-            Self::Transitions(n) => transitions + depth <= n,
-        }
-    }
-}
-
-impl Exploration {
-    pub(crate) fn constant(self, returns: ReturnRange) -> f64 {
-        match self {
-            Self::Fixed(c) => c,
-            Self::ReturnRange(factor) => factor * returns.width(),
-        }
-    }
+/// The part of `total` that tree number `index` of `trees` gets: as even as possible, the first trees one more.
+pub(crate) fn share(total: usize, trees: usize, index: usize) -> usize {
+    total / trees + usize::from(index < total % trees)
 }
 
 impl RolloutDepth {
@@ -117,6 +164,11 @@ mod tests {
         exploration = { return_range = 1.0 }
         depth = 30
         rollout_depth = \"full\"
+        action_priors = \"off\"
+        observations = \"classes\"
+        nodes = 1000000
+        trees = 1
+        threads = 1
     ";
 
     fn config() -> Config {
@@ -130,11 +182,29 @@ mod tests {
             exploration: Exploration::ReturnRange(1.0),
             depth: 30,
             rollout_depth: RolloutDepth::Full,
+            action_priors: ActionPriors::Off,
+            observations: Observations::Classes,
+            nodes: 1_000_000,
+            trees: 1,
+            threads: 1,
         };
         assert_eq!(config(), expected);
-        let other = TEXT.replace("\"full\"", "{ actions = 4 }").replace("{ return_range = 1.0 }", "{ fixed = 20.0 }");
+        let other = TEXT
+            .replace("\"full\"", "{ actions = 4 }")
+            .replace("{ return_range = 1.0 }", "{ fixed = 20.0 }")
+            .replace("{ transitions = 20000 }", "{ milliseconds = 50 }")
+            .replace("\"off\"", "\"full\"")
+            .replace("\"classes\"", "{ widening = { factor = 4.0, exponent = 0.3 } }");
         let other: Config = toml::from_str(&other).unwrap();
-        assert_eq!((other.rollout_depth, other.exploration), (RolloutDepth::Actions(4), Exploration::Fixed(20.0)));
+        let expected = Config {
+            budget: Budget::Milliseconds(50),
+            exploration: Exploration::Fixed(20.0),
+            rollout_depth: RolloutDepth::Actions(4),
+            action_priors: ActionPriors::Full,
+            observations: Observations::Widening { factor: 4.0, exponent: 0.3 },
+            ..expected
+        };
+        assert_eq!(other, expected);
     }
 
     #[test]
@@ -148,8 +218,11 @@ mod tests {
         assert!(misspelt.contains("detph"), "{misspelt}");
         let unit = toml::from_str::<Config>(&TEXT.replace("transitions", "transition")).unwrap_err().to_string();
         assert!(unit.contains("unknown variant `transition`"), "{unit}");
-        let missing = toml::from_str::<Config>(&TEXT.replace("depth = 30", "")).unwrap_err().to_string();
-        assert!(missing.contains("missing field `depth`"), "{missing}");
+        for line in TEXT.lines().filter(|l| l.contains('=')) {
+            let key = line.split_whitespace().next().unwrap();
+            let missing = toml::from_str::<Config>(&TEXT.replace(line, "")).unwrap_err().to_string();
+            assert!(missing.contains(&format!("missing field `{key}`")), "{missing}");
+        }
     }
 
     #[test]
@@ -160,19 +233,40 @@ mod tests {
             config.validate().unwrap_err().to_string()
         };
         assert_eq!(config().validate(), Ok(()));
-        assert_eq!(message(|c| c.depth = 0), "planner: `depth` is 0, but must be at least 1");
-        assert_eq!(
-            message(|c| c.budget = Budget::Transitions(29)),
-            "planner: `budget.transitions` is 29, but must be at least depth = 30"
-        );
-        assert_eq!(
-            message(|c| c.budget = Budget::Simulations(0)),
-            "planner: `budget.simulations` is 0, but must be at least 1"
-        );
-        assert_eq!(
-            message(|c| c.exploration = Exploration::Fixed(f64::NAN)),
-            "planner: `exploration.fixed` is NaN, but must be finite and not negative"
-        );
+        let expected: [(fn(&mut Config), &str); 11] = [
+            (|c| c.depth = 0, "`depth` is 0, but must be at least 1"),
+            (|c| c.trees = 0, "`trees` is 0, but must be at least 1"),
+            (|c| c.threads = 0, "`threads` is 0, but must be at least 1"),
+            (
+                |c| c.budget = Budget::Transitions(29),
+                "`budget.transitions` is 29, but must be at least depth × trees = 30",
+            ),
+            (
+                |c| (c.budget, c.trees) = (Budget::Transitions(119), 4),
+                "`budget.transitions` is 119, but must be at least depth × trees = 120",
+            ),
+            (
+                |c| (c.budget, c.trees) = (Budget::Simulations(1), 2),
+                "`budget.simulations` is 1, but must be at least trees = 2, at most 2³⁰",
+            ),
+            (|c| c.budget = Budget::Milliseconds(0), "`budget.milliseconds` is 0, but must be at least 1"),
+            (|c| (c.nodes, c.trees) = (1, 2), "`nodes` is 1, but must be at least trees = 2, at most 2³²"),
+            (
+                |c| c.observations = Observations::Widening { factor: 0.0, exponent: 0.5 },
+                "`observations.widening.factor` is 0, but must be finite and positive",
+            ),
+            (
+                |c| c.observations = Observations::Widening { factor: 1.0, exponent: 1.5 },
+                "`observations.widening.exponent` is 1.5, but must be between 0 and 1",
+            ),
+            (
+                |c| c.exploration = Exploration::Fixed(f64::NAN),
+                "`exploration.fixed` is NaN, but must be finite and not negative",
+            ),
+        ];
+        for (change, text) in expected {
+            assert_eq!(message(change), format!("planner: {text}"));
+        }
         assert_eq!(
             message(|c| c.exploration = Exploration::ReturnRange(-1.0)),
             "planner: `exploration.return_range` is -1, but must be finite and not negative"
@@ -184,5 +278,11 @@ mod tests {
         assert_eq!(RolloutDepth::Full.actions(7), 7);
         assert_eq!(RolloutDepth::Actions(3).actions(7), 3);
         assert_eq!(RolloutDepth::Actions(9).actions(7), 7);
+    }
+
+    #[test]
+    fn shares_add_up_and_differ_by_one_at_most() {
+        let shares: Vec<usize> = (0..4).map(|index| share(10, 4, index)).collect();
+        assert_eq!(shares, [3, 3, 2, 2]);
     }
 }

@@ -8,7 +8,7 @@
 //! Two doors, one with a prize; looking costs a little and tells the truth.
 //!
 //! ```
-//! use planner::{Budget, Config, Exploration, Pomcp, RolloutDepth};
+//! use planner::{ActionPriors, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth};
 //! use pomdp::{Belief, Discretise, GenerativeModel, Outcome, Purpose, Rng, Seed, Step, UniformPolicy};
 //! use rand::RngExt as _;
 //!
@@ -52,6 +52,11 @@
 //!     exploration: Exploration::ReturnRange(1.0),
 //!     depth: 5,
 //!     rollout_depth: RolloutDepth::Full,
+//!     action_priors: ActionPriors::Off,
+//!     observations: Observations::Classes,
+//!     nodes: 100_000,
+//!     trees: 1,
+//!     threads: 1,
 //! };
 //! let model = Doors([Action::Look, Action::Open(0), Action::Open(1)]);
 //! let mut rng = Seed(1).stream(Purpose::Search, 0);
@@ -66,14 +71,21 @@
 //! # Ok::<(), planner::Error>(())
 //! ```
 
+mod branching;
 mod config;
 mod error;
+mod export;
+mod nodes;
+mod parallel;
 mod pomcp;
 mod rollout;
+mod simulate;
 mod tree;
 mod ucb;
+mod widening;
 
-pub use config::{Budget, Config, Exploration, RolloutDepth};
+pub use config::{ActionPriors, Budget, Config, Exploration, Observations, RolloutDepth};
 pub use error::Error;
-pub use pomcp::{Pomcp, SearchReport};
+pub use export::{ExportLimit, TreeAction, TreeBranch, TreeNode};
+pub use pomcp::{Planner, Pomcp, Pomcpow, SearchReport, Stop};
 pub use ucb::ActionStats;

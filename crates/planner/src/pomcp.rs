@@ -1,49 +1,93 @@
-//! The search: Silver and Veness 2010, algorithm 1.
+//! The planner: trees that persist between decisions.
 
-use pomdp::{Belief, Discretise, Outcome, Policy, Rng};
+use std::fmt::Debug;
+use std::marker::PhantomData;
+
+use pomdp::{Belief, Discretise, GenerativeModel, Policy, Rng};
 use serde::{Deserialize, Serialize};
 
-use crate::rollout::rollout;
-use crate::tree::{Child, NodeId, Tree};
-use crate::ucb::{self, ActionStats, ReturnRange};
-use crate::{Config, Error};
+use crate::branching::{Branching, Export};
+use crate::export::{self, ExportLimit, TreeNode};
+use crate::nodes::NodeId;
+use crate::simulate::{Search, Share};
+use crate::tree::KeyTree;
+use crate::ucb::{self, ActionStats};
+use crate::widening::TreeOf;
+use crate::{Budget, Config, Error, parallel};
 
-/// POMCP with a tree that persists between decisions: [`search`](Self::search), act, [`prune`](Self::prune), search again.
+/// POMCP on classes of observations: [`search`](Planner::search), act, [`prune`](Planner::prune), search again.
 ///
 /// Differences from the printed algorithm: the root sampler is a belief from outside instead of particles in the nodes; the
 /// root exists before the first simulation; simulations end at a stated depth instead of where γ^depth < ε.
-pub struct Pomcp<M: Discretise> {
+pub type Pomcp<M> = Planner<M, KeyTree<<M as Discretise>::Key>>;
+
+/// POMCPOW on continuous observations: [`search`](Planner::search), act, [`reset`](Planner::reset), search again.
+///
+/// No branch belongs to the observation that is really received, so nothing of a tree is kept after an action.
+///
+/// Differences from the printed algorithm: those of [`Pomcp`]; all actions of the model's finite set are tried; states that end the
+/// episode are not held in branches, for an agent sees that its episode has ended.
+pub type Pomcpow<M> = Planner<M, TreeOf<M>>;
+
+/// A search with `config.trees` trees that persist between decisions: see [`Pomcp`] and [`Pomcpow`].
+pub struct Planner<M: GenerativeModel, T> {
     config: Config,
     actions: Vec<M::Action>,
-    tree: Option<Tree<M::Key>>,
+    /// With whether the root was reached by a simulation; empty until the first search.
+    trees: Vec<(T, Root)>,
+    model: PhantomData<fn(&M)>,
 }
 
-/// What one search found and what it cost.
+/// Whether a root carries what simulations found there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Root {
+    Fresh,
+    Known,
+}
+
+/// Why a search stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// All simulations of the budget were made.
+    Simulations,
+    /// The next simulation could have overrun the budget of transitions.
+    Transitions,
+    /// Time was up.
+    Time,
+}
+
+/// What one search found and what it cost, all trees together.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchReport<A> {
     /// Action with the highest mean return; among equals the one with more visits, then the first.
     pub action: A,
-    /// Statistics of the root's actions in the model's order, those of a kept subtree included.
+    /// Statistics of the root's actions in the model's order, those of kept subtrees and initial visits included. Several trees
+    /// are merged by visits: the mean of all their returns.
     pub actions: Vec<ActionStats>,
     /// Simulations of this search.
     pub simulations: usize,
     /// Transitions of the model in this search.
     pub transitions: usize,
-    /// Most actions that one simulation of this search took inside the tree.
+    /// Most actions that one simulation of this search took inside a tree.
     pub depth: usize,
-    /// Nodes of the tree after this search.
+    /// Nodes after this search; in widened trees with the states that they hold.
     pub nodes: usize,
-    /// Visits of the root that were kept from earlier searches.
+    /// Visits of the roots that were kept from earlier searches, initial ones included.
     pub reused: u64,
     /// Simulations that ended in a terminal state.
     pub terminal: usize,
     /// Simulations whose world diverged.
     pub diverged: usize,
-    /// Exploration constant c of the last simulation.
+    /// Simulations that found no place for a new node, because `nodes` were used up.
+    pub unexpanded: usize,
+    /// Exploration constant c of the last simulation; the mean over the trees.
     pub exploration: f64,
+    /// Why the search stopped.
+    pub stop: Stop,
 }
 
-impl<M: Discretise> Pomcp<M> {
+impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
     /// A planner without a tree.
     ///
     /// # Errors
@@ -51,7 +95,8 @@ impl<M: Discretise> Pomcp<M> {
     /// [`Error::Config`] where a value lies outside its limits.
     pub fn new(config: Config) -> Result<Self, Error> {
         config.validate()?;
-        Ok(Self { config, actions: Vec::new(), tree: None })
+        T::check(&config)?;
+        Ok(Self { config, actions: Vec::new(), trees: Vec::new(), model: PhantomData })
     }
 
     /// Searches from `belief` and names the action to execute.
@@ -61,7 +106,8 @@ impl<M: Discretise> Pomcp<M> {
     ///
     /// # Panics
     ///
-    /// When no action remains, when the model has no actions, or when they changed since the last [`reset`](Self::reset).
+    /// When no action remains, when the model has no actions, when they changed since the last [`reset`](Self::reset), or when
+    /// the policy calls every action of a state illegal.
     pub fn search<B, P>(
         &mut self,
         model: &M,
@@ -71,47 +117,87 @@ impl<M: Discretise> Pomcp<M> {
         rng: &mut Rng,
     ) -> SearchReport<M::Action>
     where
-        B: Belief<State = M::State> + ?Sized,
-        P: Policy<M> + ?Sized,
+        M: Sync,
+        B: Belief<State = M::State> + Sync + ?Sized,
+        P: Policy<M> + Sync + ?Sized,
     {
         assert!(remaining_horizon > 0, "remaining_horizon is 0: there is no action left to plan");
-        if self.tree.is_none() {
+        let config = &self.config;
+        if self.trees.is_empty() {
             self.actions = model.actions().to_vec();
+            let tree = |index| self.new_tree(index);
+            self.trees = (0..config.trees).map(tree).collect();
         }
         assert!(self.actions == model.actions(), "the model's actions changed under a kept tree: call `reset` first");
-        let tree = self.tree.get_or_insert_with(|| Tree::new(self.actions.len()));
-        let root = tree.stats(Tree::<M::Key>::ROOT);
-        let reused = root.iter().map(|s| s.visits).sum();
-        let mut returns = ReturnRange::of_means(root);
-        let depth = self.config.depth.min(remaining_horizon);
+        let reused = self.trees.iter().map(|(tree, _)| tree.nodes().visits(NodeId::ROOT)).sum();
+        let depth = config.depth.min(remaining_horizon);
 
-        let mut search =
-            Search { model, policy, config: &self.config, tree, depth, path: Vec::new(), tally: Tally::default() };
-        let mut exploration = 0.0;
-        while self.config.budget.affords(search.tally.simulations, search.tally.transitions, depth) {
-            exploration = self.config.exploration.constant(returns);
-            returns.include(search.simulate(belief.sample(rng).clone(), exploration, rng));
+        let tallies = parallel::for_each(&mut self.trees, config.threads, rng, |index, (tree, root), rng| {
+            let fresh = std::mem::replace(root, Root::Known) == Root::Fresh;
+            Search::new(model, policy, config, tree, depth).run(belief, fresh, Share::of(config, index), rng)
+        });
+
+        let mut stats = vec![ActionStats::default(); self.actions.len()];
+        for (tree, _) in &self.trees {
+            for (merged, slot) in stats.iter_mut().zip(tree.nodes().slots(NodeId::ROOT)) {
+                merged.merge(slot.stats());
+            }
         }
-
-        let tally = search.tally;
-        let stats = tree.stats(Tree::<M::Key>::ROOT).to_vec();
         let best = ucb::best(&stats).expect("a valid budget affords at least one simulation");
-        let nodes = tree.node_count();
-        tracing::debug!(best, value = stats[best].value, reused, nodes, exploration, ?tally, "search");
-        SearchReport {
+        let sum = |count: fn(&crate::simulate::Tally) -> usize| tallies.iter().map(count).sum();
+        let report = SearchReport {
             action: self.actions[best].clone(),
             actions: stats,
-            simulations: tally.simulations,
-            transitions: tally.transitions,
-            depth: tally.depth,
-            nodes,
+            simulations: sum(|t| t.simulations),
+            transitions: sum(|t| t.transitions),
+            depth: tallies.iter().map(|t| t.depth).max().unwrap_or(0),
+            nodes: self.trees.iter().map(|(tree, _)| tree.size()).sum(),
             reused,
-            terminal: tally.terminal,
-            diverged: tally.diverged,
-            exploration,
-        }
+            terminal: sum(|t| t.terminal),
+            diverged: sum(|t| t.diverged),
+            unexpanded: sum(|t| t.unexpanded),
+            exploration: tallies.iter().map(|t| t.exploration).sum::<f64>() / tallies.len() as f64,
+            stop: match config.budget {
+                Budget::Simulations(_) => Stop::Simulations,
+                Budget::Transitions(_) => Stop::Transitions,
+                Budget::Milliseconds(_) => Stop::Time,
+            },
+        };
+        let SearchReport { simulations, transitions, nodes, unexpanded, exploration, .. } = report;
+        let value = report.actions[best].value;
+        tracing::debug!(best, value, reused, simulations, transitions, nodes, unexpanded, exploration, "search");
+        report
     }
 
+    /// Forgets the trees: a new episode begins.
+    pub fn reset(&mut self) {
+        self.trees.clear();
+    }
+
+    fn new_tree(&self, index: usize) -> (T, Root) {
+        let limit = crate::config::share(self.config.nodes, self.config.trees, index);
+        (T::new(&self.config, self.actions.len(), limit), Root::Fresh)
+    }
+}
+
+impl<M: GenerativeModel, T: Export> Planner<M, T> {
+    /// Tree number `tree` as it stands, to look at; `None` where there is none.
+    #[must_use]
+    pub fn tree(&self, tree: usize, limit: ExportLimit) -> Option<TreeNode>
+    where
+        M::Action: Debug,
+    {
+        let (tree, _) = self.trees.get(tree)?;
+        let names: Vec<String> = self.actions.iter().map(|action| format!("{action:?}")).collect();
+        Some(export::node(tree, NodeId::ROOT, &names, limit))
+    }
+}
+
+impl<M> Planner<M, KeyTree<M::Key>>
+where
+    M: Discretise,
+    M::Key: Send,
+{
     /// Moves the root to the history after `action` and an observation of class `key`; everything else is dropped.
     ///
     /// A history that was never simulated leaves an empty tree. Without a tree nothing happens.
@@ -120,83 +206,14 @@ impl<M: Discretise> Pomcp<M> {
     ///
     /// When `action` is none of the model's.
     pub fn prune(&mut self, action: &M::Action, key: &M::Key) {
-        let Some(tree) = &mut self.tree else { return };
-        let index = self.actions.iter().position(|a| a == action).expect("the executed action is one of the model's");
-        tree.prune(index, key);
-    }
-
-    /// Forgets the tree: a new episode begins.
-    pub fn reset(&mut self) {
-        self.tree = None;
-    }
-}
-
-/// What the simulations of one search cost.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tally {
-    simulations: usize,
-    transitions: usize,
-    depth: usize,
-    terminal: usize,
-    diverged: usize,
-}
-
-impl Tally {
-    fn end(&mut self, outcome: Outcome) {
-        match outcome {
-            Outcome::Continue => {}
-            Outcome::Terminal => self.terminal += 1,
-            Outcome::Diverged => self.diverged += 1,
+        if self.trees.is_empty() {
+            return;
         }
-    }
-}
-
-/// One search in progress.
-struct Search<'a, M: Discretise, P: ?Sized> {
-    model: &'a M,
-    policy: &'a P,
-    config: &'a Config,
-    tree: &'a mut Tree<M::Key>,
-    /// Actions from the root to the horizon of a simulation.
-    depth: usize,
-    /// Node, action and reward of each step inside the tree; kept to spare an allocation per simulation.
-    path: Vec<(NodeId, usize, f64)>,
-    tally: Tally,
-}
-
-impl<M: Discretise, P: Policy<M> + ?Sized> Search<'_, M, P> {
-    /// One simulation from `state`: down the tree, one new leaf, a rollout, and the returns back up. Returns that of the root.
-    fn simulate(&mut self, mut state: M::State, exploration: f64, rng: &mut Rng) -> f64 {
-        let mut node = Tree::<M::Key>::ROOT;
-        let mut tail = 0.0;
-        self.path.clear();
-        loop {
-            let action = ucb::select(self.tree.stats(node), exploration, rng);
-            let step = self.model.step(&mut state, &self.model.actions()[action], rng);
-            self.path.push((node, action, step.reward));
-            if step.outcome != Outcome::Continue || self.path.len() == self.depth {
-                self.tally.end(step.outcome);
-                break;
-            }
-            match self.tree.child(node, action, self.model.key(&step.observation)) {
-                Child::Known(child) => node = child,
-                Child::New => {
-                    let actions = self.config.rollout_depth.actions(self.depth - self.path.len());
-                    let below = rollout(self.model, self.policy, &mut state, actions, rng);
-                    self.tally.end(below.outcome);
-                    self.tally.transitions += below.transitions;
-                    tail = below.discounted_return;
-                    break;
-                }
+        let action = self.actions.iter().position(|a| a == action).expect("the executed action is one of the model's");
+        for index in 0..self.trees.len() {
+            if !self.trees[index].0.prune(action, key) {
+                self.trees[index] = self.new_tree(index);
             }
         }
-        self.tally.simulations += 1;
-        self.tally.transitions += self.path.len();
-        self.tally.depth = self.tally.depth.max(self.path.len());
-        for &(node, action, reward) in self.path.iter().rev() {
-            tail = reward + self.model.discount() * tail;
-            self.tree.record(node, action, tail);
-        }
-        tail
     }
 }

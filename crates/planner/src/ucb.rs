@@ -4,20 +4,25 @@ use pomdp::Rng;
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
+use crate::Exploration;
+use crate::nodes::Slot;
+
 /// What is known of one action at one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ActionStats {
-    /// Simulations that took it: N(ha).
+    /// Simulations that took it, and initial visits: N(ha). Zero for an illegal action.
     pub visits: u64,
     /// Mean discounted return from this node on: V(ha). Zero where there are no visits.
     pub value: f64,
 }
 
 impl ActionStats {
-    /// Takes in one return.
-    pub(crate) fn record(&mut self, discounted_return: f64) {
-        self.visits += 1;
-        self.value += (discounted_return - self.value) / self.visits as f64;
+    /// Takes in what another tree found: the mean of the returns of both.
+    pub(crate) fn merge(&mut self, other: Self) {
+        self.visits += other.visits;
+        if other.visits > 0 {
+            self.value += (other.value - self.value) * (other.visits as f64 / self.visits as f64);
+        }
     }
 }
 
@@ -29,11 +34,11 @@ pub(crate) struct ReturnRange {
 }
 
 impl ReturnRange {
-    /// Range of the mean returns that `stats` brings along. Without them a search in a pruned tree would begin with a range of
+    /// Range of the mean returns that `slots` bring along. Without them a search in a pruned tree would begin with a range of
     /// zero, act greedily, and never widen it where the greedy action always returns the same.
-    pub(crate) fn of_means(stats: &[ActionStats]) -> Self {
+    pub(crate) fn of_means(slots: &[Slot]) -> Self {
         let mut range = Self { min: f64::INFINITY, max: f64::NEG_INFINITY };
-        for visited in stats.iter().filter(|s| s.visits > 0) {
+        for visited in slots.iter().filter(|s| s.visits() > 0) {
             range.include(visited.value);
         }
         range
@@ -50,20 +55,32 @@ impl ReturnRange {
     }
 }
 
+impl Exploration {
+    pub(crate) fn constant(self, returns: ReturnRange) -> f64 {
+        match self {
+            Self::Fixed(c) => c,
+            Self::ReturnRange(factor) => factor * returns.width(),
+        }
+    }
+}
+
 /// Index of the action to simulate: unvisited ones first, in random order, then the largest V(ha) + c √(ln N(h) / N(ha)).
 /// Ties are broken at random: where all returns are equal so far, the lowest index would otherwise be all that is ever tried.
-pub(crate) fn select(stats: &[ActionStats], exploration: f64, rng: &mut Rng) -> usize {
-    let unvisited = stats.iter().filter(|s| s.visits == 0).count();
+pub(crate) fn select(slots: &[Slot], exploration: f64, rng: &mut Rng) -> usize {
+    let (mut visits, mut unvisited) = (0, 0);
+    for slot in slots.iter().filter(|s| s.legal()) {
+        visits += u64::from(slot.visits());
+        unvisited += usize::from(slot.visits() == 0);
+    }
     if unvisited > 0 {
         let chosen = rng.random_range(0..unvisited);
-        let mut candidates = stats.iter().enumerate().filter(|(_, s)| s.visits == 0);
+        let mut candidates = slots.iter().enumerate().filter(|(_, s)| s.legal() && s.visits() == 0);
         return candidates.nth(chosen).expect("the draw lies below the count of the same filter").0;
     }
-    let visits: u64 = stats.iter().map(|s| s.visits).sum();
     let log_visits = (visits as f64).ln();
     let (mut best, mut best_bound, mut ties) = (0, f64::NEG_INFINITY, 0_u32);
-    for (index, action) in stats.iter().enumerate() {
-        let bound = action.value + exploration * (log_visits / action.visits as f64).sqrt();
+    for (index, slot) in slots.iter().enumerate().filter(|(_, s)| s.legal()) {
+        let bound = slot.value + exploration * (log_visits / f64::from(slot.visits())).sqrt();
         if bound > best_bound {
             (best, best_bound, ties) = (index, bound, 1);
         } else if bound == best_bound {
@@ -92,8 +109,12 @@ mod tests {
 
     use super::*;
 
-    fn stats(pairs: &[(u64, f64)]) -> Vec<ActionStats> {
-        pairs.iter().map(|&(visits, value)| ActionStats { visits, value }).collect()
+    fn slots(pairs: &[(u32, f64)]) -> Vec<Slot> {
+        pairs.iter().map(|&(visits, value)| Slot::of(visits, value)).collect()
+    }
+
+    fn stats(pairs: &[(u32, f64)]) -> Vec<ActionStats> {
+        slots(pairs).into_iter().map(Slot::stats).collect()
     }
 
     fn rng() -> Rng {
@@ -104,13 +125,13 @@ mod tests {
     fn the_bound_trades_mean_against_visits() {
         // ln 100 = 4.605: bounds at c = 1 are 1 + √(4.605/90) = 1.226 and 0.5 + √(4.605/10) = 1.179, at c = 2 they are
         // 1.452 and 1.857.
-        let stats = stats(&[(90, 1.0), (10, 0.5)]);
-        assert_eq!(select(&stats, 0.0, &mut rng()), 0);
-        assert_eq!(select(&stats, 1.0, &mut rng()), 0);
-        assert_eq!(select(&stats, 2.0, &mut rng()), 1);
+        let slots = slots(&[(90, 1.0), (10, 0.5)]);
+        assert_eq!(select(&slots, 0.0, &mut rng()), 0);
+        assert_eq!(select(&slots, 1.0, &mut rng()), 0);
+        assert_eq!(select(&slots, 2.0, &mut rng()), 1);
         // The bounds cross at c = 0.5 / (0.6786 − 0.2262) = 1.1052.
-        assert_eq!(select(&stats, 1.105, &mut rng()), 0);
-        assert_eq!(select(&stats, 1.106, &mut rng()), 1);
+        assert_eq!(select(&slots, 1.105, &mut rng()), 0);
+        assert_eq!(select(&slots, 1.106, &mut rng()), 1);
     }
 
     #[test]
@@ -118,11 +139,11 @@ mod tests {
         let mut orders = std::collections::BTreeSet::new();
         for item in 0..200 {
             let mut rng = Seed(1).stream(Purpose::Test, item);
-            let mut stats = stats(&[(0, 0.0), (5, 1e9), (0, 0.0), (0, 0.0)]);
+            let mut slots = slots(&[(0, 0.0), (5, 1e9), (0, 0.0), (0, 0.0)]);
             let order: Vec<usize> = (0..3)
                 .map(|_| {
-                    let index = select(&stats, 1.0, &mut rng);
-                    stats[index].record(0.0);
+                    let index = select(&slots, 1.0, &mut rng);
+                    slots[index].record(0.0);
                     index
                 })
                 .collect();
@@ -135,14 +156,24 @@ mod tests {
     #[test]
     fn ties_are_shared_evenly() {
         // Null: each of three tied actions is chosen with probability 1/3. n = 3000, standard deviation 25.8; tolerance 4 of them.
-        let stats = stats(&[(4, 1.0), (4, 1.0), (4, 0.0), (4, 1.0)]);
+        let slots = slots(&[(4, 1.0), (4, 1.0), (4, 0.0), (4, 1.0)]);
         let mut counts = [0_i32; 4];
         let mut rng = rng();
         for _ in 0..3000 {
-            counts[select(&stats, 1.0, &mut rng)] += 1;
+            counts[select(&slots, 1.0, &mut rng)] += 1;
         }
         assert_eq!(counts[2], 0);
         assert!([0, 1, 3].iter().all(|&i| (counts[i] - 1000).abs() < 104), "{counts:?}");
+    }
+
+    #[test]
+    fn illegal_actions_are_neither_chosen_nor_counted() {
+        // ln 100, as in the test above: had the illegal slot been counted, the second action would win at c = 1.
+        let slots = slots(&[(90, 1.0), (u32::MAX, 1e9), (10, 0.5)]);
+        assert_eq!(select(&slots, 1.105, &mut rng()), 0);
+        assert_eq!(select(&slots, 1.106, &mut rng()), 2);
+        assert_eq!(slots[1].stats().visits, 0);
+        assert_eq!(best(&[slots[1].stats(), slots[0].stats()]), Some(1));
     }
 
     #[test]
@@ -156,8 +187,8 @@ mod tests {
 
     #[test]
     fn the_range_starts_from_the_kept_means_and_is_never_negative() {
-        assert_eq!(ReturnRange::of_means(&stats(&[(0, 0.0), (0, 0.0)])).width(), 0.0);
-        let mut range = ReturnRange::of_means(&stats(&[(1, -3.0), (0, 50.0), (2, 4.0)]));
+        assert_eq!(ReturnRange::of_means(&slots(&[(0, 0.0), (0, 0.0)])).width(), 0.0);
+        let mut range = ReturnRange::of_means(&slots(&[(1, -3.0), (0, 50.0), (2, 4.0)]));
         assert_eq!(range.width(), 7.0);
         range.include(10.0);
         assert_eq!(range.width(), 13.0);
@@ -166,13 +197,25 @@ mod tests {
     proptest! {
         #[test]
         fn a_running_mean_is_the_mean(returns in prop::collection::vec(-1e3..1e3_f64, 1..50)) {
-            let mut stats = ActionStats::default();
+            let mut slot = Slot::of(0, 0.0);
             for &value in &returns {
-                stats.record(value);
+                slot.record(value);
             }
             let mean = returns.iter().sum::<f64>() / returns.len() as f64;
-            prop_assert_eq!(stats.visits, returns.len() as u64);
-            prop_assert!((stats.value - mean).abs() < 1e-9, "{} is not {}", stats.value, mean);
+            prop_assert_eq!(slot.visits() as usize, returns.len());
+            prop_assert!((slot.value - mean).abs() < 1e-9, "{} is not {}", slot.value, mean);
+        }
+
+        #[test]
+        fn merged_means_are_those_of_all_returns(trees in prop::collection::vec((0_u32..9, -1e3..1e3_f64), 1..9)) {
+            let mut merged = ActionStats::default();
+            for &(visits, value) in &trees {
+                merged.merge(ActionStats { visits: u64::from(visits), value });
+            }
+            let visits: u32 = trees.iter().map(|t| t.0).sum();
+            let total: f64 = trees.iter().map(|t| f64::from(t.0) * t.1).sum();
+            prop_assert_eq!(merged.visits, u64::from(visits));
+            prop_assert!((merged.value * f64::from(visits) - total).abs() < 1e-8);
         }
     }
 }

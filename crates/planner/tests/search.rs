@@ -1,8 +1,9 @@
 //! What a search does with its budget, its tree, its horizon and its generator, on small models with known answers.
 
 use std::cell::Cell;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use planner::{Budget, Config, Error, Exploration, Pomcp, RolloutDepth};
+use planner::{ActionPriors, Budget, Config, Error, Exploration, Observations, Pomcp, RolloutDepth, Stop};
 use pomdp::{Belief, Discretise, GenerativeModel, Outcome, Purpose, Rng, Seed, Step, UniformPolicy, conformance};
 use proptest::prelude::*;
 
@@ -27,12 +28,12 @@ struct Noise {
     discount: f64,
     /// Step at which the given action ends the world, and how.
     ending: Option<(usize, usize, Outcome)>,
-    steps: Cell<usize>,
+    steps: AtomicUsize,
 }
 
 impl Noise {
     fn new(rewards: [f64; 3]) -> Self {
-        Self { rewards, discount: 0.9, ending: None, steps: Cell::new(0) }
+        Self { rewards, discount: 0.9, ending: None, steps: AtomicUsize::new(0) }
     }
 }
 
@@ -46,7 +47,7 @@ impl GenerativeModel for Noise {
     }
 
     fn step(&self, state: &mut Counted, action: &usize, rng: &mut Rng) -> Step<u8> {
-        self.steps.set(self.steps.get() + 1);
+        self.steps.fetch_add(1, Ordering::Relaxed);
         state.0 += 1;
         let outcome = match self.ending {
             Some((step, fatal, outcome)) if step == state.0 && fatal == *action => outcome,
@@ -107,7 +108,17 @@ impl Belief for Known {
 }
 
 fn config(budget: Budget, depth: usize) -> Config {
-    Config { budget, exploration: Exploration::ReturnRange(1.0), depth, rollout_depth: RolloutDepth::Full }
+    Config {
+        budget,
+        exploration: Exploration::ReturnRange(1.0),
+        depth,
+        rollout_depth: RolloutDepth::Full,
+        action_priors: ActionPriors::Off,
+        observations: Observations::Classes,
+        nodes: 1 << 24,
+        trees: 1,
+        threads: 1,
+    }
 }
 
 fn rng(item: u64) -> Rng {
@@ -124,7 +135,7 @@ fn the_test_model_conforms() {
 #[test]
 fn an_invalid_config_makes_no_planner() {
     let error = Pomcp::<Noise>::new(config(Budget::Transitions(3), 4)).err();
-    let expected = Error::Config { key: "budget.transitions", value: "3".into(), limit: "at least depth = 4".into() };
+    let expected = Error::Config { key: "budget.transitions", value: "3".into(), limit: "at least depth × trees = 4".into() };
     assert_eq!(error, Some(expected));
 }
 
@@ -261,9 +272,9 @@ proptest! {
         let config = Config { rollout_depth, ..config(Budget::Transitions(budget), depth) };
         let mut planner = Pomcp::new(config).unwrap();
         for item in 0..2 {
-            let before = model.steps.get();
+            let before = model.steps.load(Ordering::Relaxed);
             let report = planner.search(&model, &START, &UniformPolicy, horizon, &mut rng(item));
-            prop_assert_eq!(report.transitions, model.steps.get() - before);
+            prop_assert_eq!(report.transitions, model.steps.load(Ordering::Relaxed) - before);
             prop_assert!(report.transitions <= budget);
             prop_assert!(report.transitions + depth.min(horizon) > budget);
         }

@@ -1,0 +1,168 @@
+//! The simulations of one tree: Silver and Veness 2010, algorithm 1.
+
+use std::time::{Duration, Instant};
+
+use pomdp::{ActionPrior, Belief, GenerativeModel, Outcome, Policy, Rng};
+
+use crate::branching::{Branching, Next};
+use crate::config::share;
+use crate::nodes::NodeId;
+use crate::rollout::rollout;
+use crate::ucb::{self, ReturnRange};
+use crate::{ActionPriors, Budget, Config};
+
+/// What the simulations of one tree cost.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    pub(crate) simulations: usize,
+    pub(crate) transitions: usize,
+    pub(crate) depth: usize,
+    pub(crate) terminal: usize,
+    pub(crate) diverged: usize,
+    pub(crate) unexpanded: usize,
+    /// Exploration constant of the last simulation.
+    pub(crate) exploration: f64,
+}
+
+impl Tally {
+    fn end(&mut self, outcome: Outcome) {
+        match outcome {
+            Outcome::Continue => {}
+            Outcome::Terminal => self.terminal += 1,
+            Outcome::Diverged => self.diverged += 1,
+        }
+    }
+}
+
+/// What one tree may use up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Share {
+    Simulations(usize),
+    Transitions(usize),
+    Until(Instant),
+}
+
+impl Share {
+    /// The part of tree number `index` in the configured budget, from now on.
+    pub(crate) fn of(config: &Config, index: usize) -> Self {
+        match config.budget {
+            Budget::Simulations(n) => Self::Simulations(share(n, config.trees, index)),
+            Budget::Transitions(n) => Self::Transitions(share(n, config.trees, index)),
+            Budget::Milliseconds(n) => {
+                // Threads take the trees in turns; a turn lasts as long for every tree.
+                let turns = config.trees.div_ceil(config.threads.min(config.trees));
+                let turn = Duration::from_millis(n) / u32::try_from(turns).unwrap_or(u32::MAX);
+                #[expect(clippy::disallowed_methods, reason = "a budget of wall-clock time is documented as not reproducible")]
+                Self::Until(Instant::now() + turn)
+            }
+        }
+    }
+
+    /// Whether one more simulation of at most `depth` transitions may start.
+    fn affords(self, tally: &Tally, depth: usize) -> bool {
+        match self {
+            Self::Simulations(n) => tally.simulations < n,
+            Self::Transitions(n) => tally.transitions + depth <= n,
+            #[expect(clippy::disallowed_methods, reason = "a budget of wall-clock time is documented as not reproducible")]
+            Self::Until(deadline) => tally.simulations == 0 || Instant::now() < deadline,
+        }
+    }
+}
+
+/// One search in progress.
+pub(crate) struct Search<'a, M: GenerativeModel, P: ?Sized, T> {
+    model: &'a M,
+    policy: &'a P,
+    config: &'a Config,
+    tree: &'a mut T,
+    /// Actions from the root to the horizon of a simulation.
+    depth: usize,
+    /// Node, action and reward of each step inside the tree; kept to spare an allocation per simulation.
+    path: Vec<(NodeId, usize, f64)>,
+    priors: Vec<ActionPrior>,
+    tally: Tally,
+}
+
+impl<'a, M, P, T> Search<'a, M, P, T>
+where
+    M: GenerativeModel,
+    P: Policy<M> + ?Sized,
+    T: Branching<M>,
+{
+    pub(crate) fn new(model: &'a M, policy: &'a P, config: &'a Config, tree: &'a mut T, depth: usize) -> Self {
+        let priors = vec![ActionPrior::default(); tree.nodes().actions()];
+        Self { model, policy, config, tree, depth, path: Vec::new(), priors, tally: Tally::default() }
+    }
+
+    /// Simulates from `belief` until the share is used up. `fresh` says that the root was not reached by a simulation yet.
+    pub(crate) fn run<B>(mut self, belief: &B, fresh: bool, share: Share, rng: &mut Rng) -> Tally
+    where
+        B: Belief<State = M::State> + ?Sized,
+    {
+        let mut returns = ReturnRange::of_means(self.tree.nodes().slots(NodeId::ROOT));
+        while share.affords(&self.tally, self.depth) {
+            self.tally.exploration = self.config.exploration.constant(returns);
+            let state = belief.sample(rng).clone();
+            if fresh && self.tally.simulations == 0 {
+                self.set_priors(NodeId::ROOT, &state);
+            }
+            returns.include(self.simulate(state, rng));
+        }
+        self.tally
+    }
+
+    /// One simulation from `state`: down the tree, one new leaf, a rollout, and the returns back up. Returns that of the root.
+    fn simulate(&mut self, mut state: M::State, rng: &mut Rng) -> f64 {
+        let mut node = NodeId::ROOT;
+        let mut tail = 0.0;
+        self.path.clear();
+        loop {
+            let action = ucb::select(self.tree.nodes().slots(node), self.tally.exploration, rng);
+            let mut step = self.model.step(&mut state, &self.model.actions()[action], rng);
+            if step.outcome != Outcome::Continue || self.path.len() + 1 == self.depth {
+                self.path.push((node, action, step.reward));
+                self.tally.end(step.outcome);
+                break;
+            }
+            let next = self.tree.follow(self.model, node, action, &mut state, &mut step, rng);
+            self.path.push((node, action, step.reward));
+            match next {
+                Next::Known(child) => node = child,
+                Next::New(_) | Next::Full => {
+                    if let Next::New(child) = next {
+                        self.set_priors(child, &state);
+                    } else {
+                        self.tally.unexpanded += 1;
+                    }
+                    let left = self.depth - self.path.len();
+                    let actions = self.config.rollout_depth.actions(left);
+                    let below = rollout(self.model, self.policy, &mut state, actions, left, rng);
+                    self.tally.end(below.outcome);
+                    self.tally.transitions += below.transitions;
+                    tail = below.discounted_return;
+                    break;
+                }
+            }
+        }
+        self.tally.simulations += 1;
+        self.tally.transitions += self.path.len();
+        self.tally.depth = self.tally.depth.max(self.path.len());
+        let discount = self.model.discount();
+        for &(node, action, reward) in self.path.iter().rev() {
+            tail = reward + discount * tail;
+            self.tree.nodes_mut().slot_mut(node, action).record(tail);
+        }
+        tail
+    }
+
+    fn set_priors(&mut self, node: NodeId, state: &M::State) {
+        let full = match self.config.action_priors {
+            ActionPriors::Off => return,
+            ActionPriors::Legal => false,
+            ActionPriors::Full => true,
+        };
+        self.priors.fill(ActionPrior::default());
+        self.policy.priors(self.model, state, &mut self.priors);
+        self.tree.nodes_mut().set_priors(node, &self.priors, full);
+    }
+}

@@ -1,0 +1,196 @@
+//! The search tree of continuous observations: POMCPOW (Sunberg and Kochenderfer, "Online algorithms for POMDPs with continuous
+//! state, action, and observation spaces", ICAPS 2018, algorithm 2), with all actions of a finite set.
+//!
+//! A branch holds the states of all simulations that came through it, each weighted by the likelihood of the branch's observation
+//! and with the reward of the step that led to it. A simulation goes on from one drawn by weight, so that below a branch the belief
+//! is that of its observation, although no two simulations see the same one.
+
+use pomdp::{GenerativeModel, ObservationModel, Rng, Step};
+use rand::RngExt as _;
+
+use crate::branching::{Branching, Export, Next};
+use crate::nodes::{NodeId, Nodes};
+use crate::{Config, Error, Observations};
+
+/// A state in a branch.
+#[derive(Clone, Debug)]
+struct Held<S> {
+    state: S,
+    reward: f64,
+    /// Sum of the weights up to this one.
+    cumulative: f64,
+}
+
+/// The branch that leads to a node.
+#[derive(Debug)]
+struct Branch<S, O> {
+    observation: O,
+    /// Simulations that came this way: M(hao).
+    passed: u32,
+    /// Log likelihood that counts as weight one: that of the state which made the observation. Without it, sharp densities
+    /// would leave the range of numbers.
+    log_reference: f64,
+    held: Vec<Held<S>>,
+    /// Next branch of the same action, or [`NodeId::NONE`].
+    next: NodeId,
+}
+
+impl<S: Clone, O> Branch<S, O> {
+    fn add(&mut self, state: &S, reward: f64, log_likelihood: f64) {
+        // e^600 is far from infinity, and no sum of as many as fit into memory reaches it.
+        let weight = (log_likelihood - self.log_reference).min(600.0).exp();
+        let weight = if weight.is_nan() { 0.0 } else { weight };
+        let cumulative = self.held.last().map_or(0.0, |last| last.cumulative) + weight;
+        self.held.push(Held { state: state.clone(), reward, cumulative });
+    }
+
+    /// A state drawn by weight, or none where all weights are zero.
+    fn draw(&self, rng: &mut Rng) -> Option<&Held<S>> {
+        let total = self.held.last()?.cumulative;
+        if total <= 0.0 {
+            return None;
+        }
+        let mark = rng.random::<f64>() * total;
+        let index = self.held.partition_point(|held| held.cumulative <= mark);
+        // Rounding may put the mark onto the total; the last one of positive weight is where that total was reached.
+        Some(&self.held[index.min(self.held.partition_point(|held| held.cumulative < total))])
+    }
+}
+
+/// All histories under the current one.
+#[derive(Debug)]
+pub struct WeightedTree<S, O> {
+    nodes: Nodes,
+    /// Entry n − 1 is the branch to node n.
+    branches: Vec<Branch<S, O>>,
+    /// States in all branches.
+    held: usize,
+    factor: f64,
+    exponent: f64,
+}
+
+impl<S: Clone, O> WeightedTree<S, O> {
+    fn new(actions: usize, limit: usize, factor: f64, exponent: f64) -> Self {
+        Self { nodes: Nodes::new(actions, limit), branches: Vec::new(), held: 0, factor, exponent }
+    }
+
+    /// Branches of an action, the newest first.
+    fn of(&self, node: NodeId, action: usize) -> impl Iterator<Item = NodeId> {
+        let first = self.nodes.slot(node, action).branch;
+        let some = |at: NodeId| (at != NodeId::NONE).then_some(at);
+        std::iter::successors(some(first), move |at| some(self.branches[at.index() - 1].next))
+    }
+
+    /// Whether an action with `visits` and `branches` gets another one.
+    fn widens(&self, visits: u32, branches: usize) -> bool {
+        branches as f64 <= self.factor * f64::from(visits).powf(self.exponent)
+    }
+
+    /// A branch drawn in proportion to the simulations that came through it.
+    fn draw(&self, node: NodeId, action: usize, rng: &mut Rng) -> Option<NodeId> {
+        let passed = |at: NodeId| u64::from(self.branches[at.index() - 1].passed);
+        let total: u64 = self.of(node, action).map(passed).sum();
+        let mut mark = if total > 0 { rng.random_range(0..total) } else { return None };
+        self.of(node, action).find(|&at| {
+            let here = mark < passed(at);
+            mark = mark.saturating_sub(passed(at));
+            here
+        })
+    }
+}
+
+impl<M> Branching<M> for WeightedTree<M::State, M::Observation>
+where
+    M: ObservationModel,
+    M::State: Send,
+    M::Observation: Send,
+{
+    fn check(config: &Config) -> Result<(), Error> {
+        match config.observations {
+            Observations::Widening { .. } => Ok(()),
+            Observations::Classes => Err(Error::Config {
+                key: "observations",
+                value: "classes".into(),
+                limit: "`widening` for `Pomcpow`; `Pomcp` takes classes".into(),
+            }),
+        }
+    }
+
+    fn new(config: &Config, actions: usize, limit: usize) -> Self {
+        let Observations::Widening { factor, exponent } = config.observations else {
+            unreachable!("`check` lets only widening through")
+        };
+        Self::new(actions, limit, factor, exponent)
+    }
+
+    fn nodes(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    fn nodes_mut(&mut self) -> &mut Nodes {
+        &mut self.nodes
+    }
+
+    fn size(&self) -> usize {
+        self.nodes.count() + self.held
+    }
+
+    fn follow(
+        &mut self,
+        model: &M,
+        node: NodeId,
+        action: usize,
+        state: &mut M::State,
+        step: &mut Step<M::Observation>,
+        rng: &mut Rng,
+    ) -> Next {
+        let named = &model.actions()[action];
+        let slot = self.nodes.slot(node, action);
+        // A new branch takes two places: a node and its first state.
+        let full = self.nodes.full(self.held + 1);
+        if !full && self.widens(slot.visits(), self.of(node, action).count()) {
+            let log_likelihood = model.log_likelihood(named, state, &step.observation);
+            let log_reference = if log_likelihood.is_finite() { log_likelihood } else { 0.0 };
+            let new = self.nodes.add();
+            let mut branch = Branch {
+                observation: step.observation.clone(),
+                passed: 1,
+                log_reference,
+                held: Vec::new(),
+                next: slot.branch,
+            };
+            branch.add(state, step.reward, log_likelihood);
+            self.branches.push(branch);
+            self.held += 1;
+            self.nodes.slot_mut(node, action).branch = new;
+            return Next::New(new);
+        }
+        let Some(child) = self.draw(node, action, rng) else { return Next::Full };
+        let branch = &mut self.branches[child.index() - 1];
+        branch.passed += 1;
+        if !full {
+            branch.add(state, step.reward, model.log_likelihood(named, state, &branch.observation));
+            self.held += 1;
+        }
+        // Where no state of the branch explains its observation, the simulation goes on with its own.
+        if let Some(held) = branch.draw(rng) {
+            (*state, step.reward) = (held.state.clone(), held.reward);
+        }
+        Next::Known(child)
+    }
+}
+
+impl<S: Clone, O> Export for WeightedTree<S, O> {
+    fn arena(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    fn branches(&self, node: NodeId, action: usize) -> Vec<(String, NodeId)> {
+        let mut found: Vec<NodeId> = self.of(node, action).collect();
+        found.reverse();
+        found.into_iter().enumerate().map(|(index, at)| (format!("#{index}"), at)).collect()
+    }
+}
+
+/// What [`crate::Pomcpow`] keeps of a model.
+pub(crate) type TreeOf<M> = WeightedTree<<M as GenerativeModel>::State, <M as GenerativeModel>::Observation>;
