@@ -3,7 +3,7 @@
 use belief::{Particles, RejectionFilter};
 use physics_model::{Action, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::Pomcp;
-use pomdp::{Discretise as _, Outcome, Prior as _, Purpose, Rng, Seed, Updater as _, discounted_return};
+use pomdp::{Discretise as _, Outcome, Prior as _, Proposals, Purpose, Rng, Seed, Updater as _, discounted_return};
 use prior::Suggester;
 use scenario::Problem;
 
@@ -105,9 +105,9 @@ impl<'a> Agent<'a> {
             };
             mind = match mind {
                 Mind::Belief(mut search, particles) => {
-                    let filter = RejectionFilter::new(self.problem.scenario.belief.clone())?;
-                    match filter.update(model, particles, &record.action, &observation, &proposals, &mut streams.filter)
-                    {
+                    let mut filter = RejectionFilter::new(self.problem.scenario.belief.clone())?;
+                    let proposals = Proposals::unweighted(&proposals);
+                    match filter.update(model, particles, &record.action, &observation, proposals, &mut streams.filter) {
                         Ok((particles, report)) => {
                             depletions += usize::from(report.acceptance == 0.0);
                             record.transitions += report.transitions;
@@ -361,9 +361,9 @@ mod tests {
         let action = Action::ALL[0];
         let step = world.act(action).unwrap();
         assert_eq!(step.outcome, Outcome::Continue);
-        let filter = RejectionFilter::new(problem.scenario.belief.clone()).unwrap();
+        let mut filter = RejectionFilter::new(problem.scenario.belief.clone()).unwrap();
         let (particles, _) =
-            filter.update(&problem.model, particles, &action, &step.observation, &[], &mut rng).unwrap();
+            filter.update(&problem.model, particles, &action, &step.observation, Proposals::none(), &mut rng).unwrap();
         let shifted: Vec<f64> = step.joints_rad.iter().map(|q| q + 0.001).collect();
         let particles = with_joints(particles, &shifted).unwrap();
         assert!(particles.iter().all(|(p, _)| p.state.joints_rad == shifted));

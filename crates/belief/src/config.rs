@@ -49,7 +49,12 @@ impl Config {
     }
 }
 
-fn require(holds: bool, key: &'static str, value: &dyn ToString, limit: impl Into<String>) -> Result<(), Error> {
+pub(crate) fn require(
+    holds: bool,
+    key: &'static str,
+    value: &dyn ToString,
+    limit: impl Into<String>,
+) -> Result<(), Error> {
     if holds { Ok(()) } else { Err(Error::Config { key, value: value.to_string(), limit: limit.into() }) }
 }
 

@@ -21,6 +21,21 @@ pub fn effective_sample_size(weights: &[f64]) -> f64 {
     sum * sum / squares
 }
 
+/// ln Σ exp(x), by way of the largest so that nothing overflows or all underflows; −∞ for an empty or impossible sum.
+pub(crate) fn log_sum_exp(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let largest = logs.clone().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        return largest;
+    }
+    largest + logs.map(|x| (x - largest).exp()).sum::<f64>().ln()
+}
+
+/// [`effective_sample_size`] of weights given by their logarithms.
+pub(crate) fn log_effective_sample_size(logs: impl Iterator<Item = f64> + Clone) -> f64 {
+    let sum = log_sum_exp(logs.clone());
+    if sum == f64::NEG_INFINITY { 0.0 } else { (-log_sum_exp(logs.map(|x| 2.0 * (x - sum)))).exp() }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -37,6 +52,17 @@ mod tests {
     #[test]
     fn tiny_weights_do_not_underflow() {
         assert_eq!(effective_sample_size(&[1e-200; 5]), 5.0);
+    }
+
+    #[test]
+    fn logarithms_far_from_zero_are_summed() {
+        for shift in [-1e5, 0.0, 1e5] {
+            let logs = [4.0_f64.ln() + shift, 2.0_f64.ln() + shift, f64::NEG_INFINITY];
+            assert!((log_sum_exp(logs.into_iter()) - 6.0_f64.ln() - shift).abs() < 1e-10);
+            assert!((log_effective_sample_size(logs.into_iter()) - 1.8).abs() < 1e-9);
+        }
+        assert_eq!(log_sum_exp([f64::NEG_INFINITY; 2].into_iter()), f64::NEG_INFINITY);
+        assert_eq!(log_effective_sample_size([f64::NEG_INFINITY; 2].into_iter()), 0.0);
     }
 
     proptest! {

@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use belief::{Config, Particles, RejectionFilter};
-//! use pomdp::{Discretise, GenerativeModel, Outcome, Perturb, Purpose, Rng, Seed, Step, Updater};
+//! use pomdp::{Discretise, GenerativeModel, Outcome, Perturb, Proposals, Purpose, Rng, Seed, Step, Updater};
 //! use rand::RngExt as _;
 //!
 //! struct Coin;
@@ -40,11 +40,11 @@
 //!     }
 //! }
 //!
-//! let filter = RejectionFilter::new(Config { particles: 1000, max_attempts: 10_000, noise_share: 0.2, proposal_share: 0.1 })?;
+//! let mut filter = RejectionFilter::new(Config { particles: 1000, max_attempts: 10_000, noise_share: 0.2, proposal_share: 0.1 })?;
 //! let belief = Particles::uniform(vec![0.5, 1.0])?;
 //! let mut rng = Seed(1).stream(Purpose::Filter, 0);
 //!
-//! let (belief, report) = filter.update(&Coin, belief, &(), &true, &[], &mut rng)?;
+//! let (belief, report) = filter.update(&Coin, belief, &(), &true, Proposals::none(), &mut rng)?;
 //! let biased = belief.states().iter().filter(|&&heads| heads == 1.0).count();
 //! assert!((biased as f64 / 1000.0 - 2.0 / 3.0).abs() < 0.06); // Bayes: 1 / (1 + 1/2)
 //! assert!((report.log_evidence - 0.75_f64.ln()).abs() < 0.06);
@@ -57,9 +57,12 @@ mod error;
 mod particles;
 mod reinvigorate;
 mod rejection;
+mod resample;
+mod weighted;
 
 pub use config::Config;
 pub use diagnostics::effective_sample_size;
 pub use error::Error;
 pub use particles::Particles;
 pub use rejection::RejectionFilter;
+pub use weighted::{Trackable, WeightedConfig, WeightedFilter};

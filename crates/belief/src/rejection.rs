@@ -1,6 +1,6 @@
 //! The rejection filter of POMCP, with reinvigoration and outside proposals.
 
-use pomdp::{Belief as _, Discretise, Outcome, Perturb, Rng, UpdateReport, Updater};
+use pomdp::{Belief as _, Discretise, Outcome, Perturb, Proposals, Rng, UpdateReport, Updater};
 
 use crate::reinvigorate::{copies, perturbed};
 use crate::{Config, Error, Particles};
@@ -22,7 +22,7 @@ use crate::{Config, Error, Particles};
 /// episode is over cannot be stepped again. A diverged world has likelihood zero: it is dropped and counted.
 ///
 /// `log_evidence` is ln(acceptance) of phase 1 alone, for perturbed particles come from another distribution than b. `acceptance`
-/// is that of both phases. Every attempt is one transition on one clone of a state.
+/// is that of both phases. The density of proposals is not used. Every attempt is one transition on one clone of a state.
 #[derive(Clone, Debug)]
 pub struct RejectionFilter {
     config: Config,
@@ -51,15 +51,16 @@ impl<M: Discretise + Perturb> Updater<M> for RejectionFilter {
     type Error = Error;
 
     fn update(
-        &self,
+        &mut self,
         model: &M,
         belief: Self::Belief,
         action: &M::Action,
         observation: &M::Observation,
-        proposals: &[M::State],
+        proposals: Proposals<'_, M::State>,
         rng: &mut Rng,
     ) -> Result<(Self::Belief, UpdateReport), Error> {
         let Config { particles, max_attempts, .. } = self.config;
+        let proposals = proposals.states;
         let places = self.config.proposal_places();
         let proposed = proposals.len().min(places);
         let simulated = particles - proposed;
@@ -74,8 +75,11 @@ impl<M: Discretise + Perturb> Updater<M> for RejectionFilter {
         let acceptance = accepted.len() as f64 / attempts as f64;
         let mut report = UpdateReport {
             effective_sample_size: particles as f64,
+            effective_sample_size_before: accepted.len() as f64,
             log_evidence,
             acceptance,
+            particles,
+            temperature: 1.0,
             diverged,
             transitions: attempts,
             ..UpdateReport::default()

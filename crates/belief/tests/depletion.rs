@@ -4,7 +4,8 @@ use std::cell::Cell;
 
 use belief::{Config, Error, Particles, RejectionFilter};
 use pomdp::{
-    Discretise, GenerativeModel, Outcome, Perturb, Purpose, Rng, Seed, Step, UpdateReport, Updater, conformance,
+    Discretise, GenerativeModel, Outcome, Perturb, Proposals, Purpose, Rng, Seed, Step, UpdateReport, Updater,
+    conformance,
 };
 use proptest::prelude::*;
 use rand_distr::{Distribution as _, Normal};
@@ -68,8 +69,14 @@ fn update(
 ) -> Result<(Vec<f64>, UpdateReport), Error> {
     let mut rng = Seed(1).stream(Purpose::Test, 0);
     let belief = Particles::uniform(belief).unwrap();
-    let (belief, report) =
-        RejectionFilter::new(config).unwrap().update(model, belief, &action, &observation, proposals, &mut rng)?;
+    let (belief, report) = RejectionFilter::new(config).unwrap().update(
+        model,
+        belief,
+        &action,
+        &observation,
+        Proposals::unweighted(proposals),
+        &mut rng,
+    )?;
     Ok((belief.into_states(), report))
 }
 

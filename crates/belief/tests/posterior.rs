@@ -1,7 +1,7 @@
 //! The rejection filter against the exact posterior of a hidden Markov model.
 
 use belief::{Config, Particles, RejectionFilter};
-use pomdp::{Discretise, GenerativeModel, Outcome, Perturb, Purpose, Rng, Seed, Step, Updater, conformance};
+use pomdp::{Discretise, GenerativeModel, Outcome, Perturb, Proposals, Purpose, Rng, Seed, Step, Updater, conformance};
 use rand::RngExt as _;
 
 const STATES: usize = 3;
@@ -97,7 +97,8 @@ fn one_update_draws_from_the_exact_posterior() {
     let mut chi_squared = 0.0;
     for (action, observation) in HISTORY {
         let belief = Particles::weighted(vec![0, 1, 2], exact.to_vec()).unwrap();
-        let (belief, report) = filter(n).update(&Markov, belief, &action, &observation, &[], &mut rng).unwrap();
+        let (belief, report) =
+            filter(n).update(&Markov, belief, &action, &observation, Proposals::none(), &mut rng).unwrap();
         let evidence;
         (exact, evidence) = bayes(exact, action, observation);
         for (count, p) in counts(&belief).into_iter().zip(exact) {
@@ -123,7 +124,7 @@ fn a_chain_of_updates_follows_the_exact_posterior() {
     let mut belief = Particles::weighted(vec![0, 1, 2], PRIOR.to_vec()).unwrap();
     let mut exact = PRIOR;
     for (action, observation) in HISTORY {
-        (belief, _) = filter(n).update(&Markov, belief, &action, &observation, &[], &mut rng).unwrap();
+        (belief, _) = filter(n).update(&Markov, belief, &action, &observation, Proposals::none(), &mut rng).unwrap();
         (exact, _) = bayes(exact, action, observation);
     }
     let errors: Vec<f64> = counts(&belief).iter().zip(exact).map(|(c, p)| c / n as f64 - p).collect();
@@ -135,7 +136,7 @@ fn equal_seeds_give_equal_beliefs_and_other_seeds_others() {
     let run = |item| {
         let mut rng = Seed(1).stream(Purpose::Test, item);
         let belief = Particles::uniform(vec![0, 1, 2]).unwrap();
-        filter(100).update(&Markov, belief, &0, &1, &[0, 1], &mut rng).unwrap()
+        filter(100).update(&Markov, belief, &0, &1, Proposals::unweighted(&[0, 1]), &mut rng).unwrap()
     };
     assert_eq!(run(1), run(1));
     assert_ne!(run(1), run(2));

@@ -12,9 +12,9 @@ pub mod policy;
 pub mod prior;
 pub mod seed;
 
-pub use belief::{Belief, UpdateReport, Updater};
+pub use belief::{Belief, Proposals, StructureReport, UpdateReport, Updater};
 pub use episode::{Transition, discounted_return};
-pub use model::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Step};
+pub use model::{Discretise, GenerativeModel, ObservationModel, Outcome, Partition, Perturb, StaticParameters, Step};
 pub use policy::{ActionPrior, Policy, UniformPolicy};
 pub use prior::{Density, Prior};
 pub use seed::{Purpose, Rng, Seed};

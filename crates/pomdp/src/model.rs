@@ -65,3 +65,37 @@ pub trait Perturb: GenerativeModel {
     /// Adds zero-mean noise to every uncertain value of `state`, within its physical range.
     fn perturb(&self, state: &mut Self::State, rng: &mut Rng);
 }
+
+/// A model whose state holds parameters that stay fixed during an episode: what Liu–West smoothing moves, and by whose discrete part a
+/// weighted filter keeps its books.
+///
+/// The discrete part, [`Self::Structure`], says how many continuous values there are and what they mean (shape of the object and class of
+/// the obstacle; the values that do not apply to a shape are left out). The continuous part is handed out in unconstrained coordinates, in
+/// which a Gaussian makes sense: ln of a mass or a size, logit of a friction coefficient, an angle near its mean. A value of the state that
+/// no action changes (the pose of a fixed obstacle) is a parameter in this sense, and should be among them if it is not observed.
+///
+/// Check an implementation with [`crate::conformance::check_static_parameters`].
+pub trait StaticParameters: GenerativeModel {
+    /// Discrete part of the parameters. No step changes it.
+    type Structure: Clone + Ord + std::fmt::Debug + Send + Sync;
+
+    /// Discrete part of the parameters of `state`.
+    fn structure(&self, state: &Self::State) -> Self::Structure;
+
+    /// Continuous part, in unconstrained coordinates; as many values for every state of a structure, none where nothing is continuous.
+    fn parameters(&self, state: &Self::State) -> Vec<f64>;
+
+    /// `state` with other continuous parameters, its structure kept, and all that follows from them brought into line (what stands on a
+    /// table goes on standing on it when it gets taller). `None` where that is no possible world: a value outside its range, bodies that
+    /// overlap.
+    fn with_parameters(&self, state: &Self::State, parameters: &[f64]) -> Option<Self::State>;
+}
+
+/// A model whose states fall into coarse cells: the bins in which an adaptive filter measures how spread out a belief is.
+pub trait Partition: GenerativeModel {
+    /// Cell of a state.
+    type Cell: Clone + Ord + std::fmt::Debug;
+
+    /// Cell of `state`. The structure of its parameters need not be part of it: filters count cells per structure.
+    fn cell(&self, state: &Self::State) -> Self::Cell;
+}

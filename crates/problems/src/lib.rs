@@ -2,11 +2,17 @@
 //!
 //! Tests and benchmarks of `planner` and `belief` run on these. States are small `Copy` values, a step takes some ten nanoseconds, and
 //! every transition and observation function is tested against its published definition.
+//!
+//! For filters there are [`hmm`] (posterior and evidence by Bayes' rule), [`linear_gaussian`] (Kalman) and [`static_parameter`] (conjugate
+//! posteriors of two structures).
 
 pub mod bits;
 pub mod episode;
+pub mod hmm;
 pub mod light_dark;
+pub mod linear_gaussian;
 pub mod rock_sample;
+pub mod static_parameter;
 pub mod tag;
 pub mod tiger;
 
