@@ -1,11 +1,11 @@
 //! The loop.
 
-use belief::{Particles, RejectionFilter};
+use belief::Particles;
 use physics_model::{Action, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::Pomcp;
-use pomdp::{Discretise as _, Outcome, Prior as _, Proposals, Purpose, Rng, Seed, Updater as _, discounted_return};
+use pomdp::{Discretise as _, Outcome, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
 use prior::Suggester;
-use scenario::Problem;
+use scenario::{Problem, Tracker};
 
 use crate::{Episode, Error, Method, Reason, StepRecord, World};
 
@@ -21,13 +21,13 @@ pub struct Agent<'a> {
 }
 
 /// What an agent carries from step to step.
-enum Mind {
+enum Mind<'a> {
     /// No search: the last measured position of the object.
     Heuristic,
     /// Search from the true state.
     Oracle(Box<Pomcp<PushModel>>),
     /// Search from the belief.
-    Belief(Box<Pomcp<PushModel>>, Particles<Particle>),
+    Belief(Box<Pomcp<PushModel>>, Particles<Particle>, Tracker<'a>),
 }
 
 struct Streams {
@@ -104,17 +104,16 @@ impl<'a> Agent<'a> {
                 None => Vec::new(),
             };
             mind = match mind {
-                Mind::Belief(mut search, particles) => {
-                    let mut filter = RejectionFilter::new(self.problem.scenario.belief.clone())?;
+                Mind::Belief(mut search, particles, mut filter) => {
                     let proposals = Proposals::unweighted(&proposals);
-                    match filter.update(model, particles, &record.action, &observation, proposals, &mut streams.filter) {
+                    match filter.update(model, particles, record.action, &observation, proposals, &mut streams.filter) {
                         Ok((particles, report)) => {
-                            depletions += usize::from(report.acceptance == 0.0);
+                            depletions += usize::from(report.acceptance == 0.0 || report.recoveries > 0);
                             record.transitions += report.transitions;
                             record.update = Some(report);
                             record.obstacle_share = Some(obstacle_share(&particles));
                             search.prune(&record.action, &model.key(&observation));
-                            Mind::Belief(search, with_joints(particles, &joints_rad)?)
+                            Mind::Belief(search, with_joints(particles, &joints_rad)?, filter)
                         }
                         Err(belief::Error::Depleted { attempts, .. }) => {
                             depletions += 1;
@@ -148,7 +147,7 @@ impl<'a> Agent<'a> {
         Ok(Episode { reason, discounted_return, depletions, steps })
     }
 
-    fn first_mind(&self, observation: &Observation, seed: Seed) -> Result<Mind, Error> {
+    fn first_mind(&self, observation: &Observation, seed: Seed) -> Result<Mind<'a>, Error> {
         let scenario = &self.problem.scenario;
         let search = || Pomcp::new(scenario.planner.clone()).map(Box::new);
         Ok(match self.method {
@@ -156,16 +155,16 @@ impl<'a> Agent<'a> {
             Method::Oracle => Mind::Oracle(search()?),
             Method::NoRnn | Method::RnnMax | Method::RnnSampling => {
                 let mut rng = seed.stream(Purpose::InitialBelief, 0);
-                let particles = self.problem.initial_particles(scenario.belief.particles, observation, &mut rng)?;
+                let particles = self.problem.initial_particles(scenario.belief.particles(), observation, &mut rng)?;
                 let particles = Particles::uniform(particles)?;
-                Mind::Belief(search()?, particles)
+                Mind::Belief(search()?, particles, self.problem.tracker(observation)?)
             }
         })
     }
 
     fn decide(
         &self,
-        mind: &mut Mind,
+        mind: &mut Mind<'_>,
         world: &dyn World,
         observation: &Observation,
         joints_rad: &[f64],
@@ -180,7 +179,7 @@ impl<'a> Agent<'a> {
                 let belief = Particles::uniform(vec![truth])?;
                 Some(search.search(model, &belief, &HeuristicPolicy, remaining, &mut streams.search))
             }
-            Mind::Belief(search, particles) => {
+            Mind::Belief(search, particles, _) => {
                 Some(search.search(model, particles, &HeuristicPolicy, remaining, &mut streams.search))
             }
         };
@@ -361,7 +360,7 @@ mod tests {
         let action = Action::ALL[0];
         let step = world.act(action).unwrap();
         assert_eq!(step.outcome, Outcome::Continue);
-        let mut filter = RejectionFilter::new(problem.scenario.belief.clone()).unwrap();
+        let mut filter = belief::RejectionFilter::new(problem.scenario.belief.rejection.clone()).unwrap();
         let (particles, _) =
             filter.update(&problem.model, particles, &action, &step.observation, Proposals::none(), &mut rng).unwrap();
         let shifted: Vec<f64> = step.joints_rad.iter().map(|q| q + 0.001).collect();

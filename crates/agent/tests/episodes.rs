@@ -45,7 +45,7 @@ fn the_same_seed_plays_the_same_episode() {
     assert_eq!(play(Seed(3)), first);
     assert_ne!(play(Seed(4)), first);
     for step in &first.steps {
-        assert!(step.transitions > 0 && step.transitions <= 100 + problem.scenario.belief.max_attempts, "{step:?}");
+        assert!(step.transitions > 0 && step.transitions <= 100 + problem.scenario.belief.transitions(), "{step:?}");
     }
 }
 

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use bench::report::{page, summarise};
 use bench::{accuracy, closed_forms, report, scenes};
 use physics_model::config::WorldConfig;
+use physics_model::feasible::parts_in_reach;
+use physics_model::world::ToolPose;
 
 fn root() -> PathBuf {
     scenario::find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).expect("project")
@@ -20,7 +22,7 @@ fn pushes_end_where_mujoco_says() {
     assert!(scenes.len() >= 60, "{} scenes", scenes.len());
     let errors: Vec<_> = scenes.iter().map(|(scene, theirs)| accuracy::compare(scene, theirs, &world())).collect();
     let s = summarise(&errors);
-    // Measured 0.32 and 2.9 mm, 0.7 and 4.2 degrees, 7 %; the limits are those of the requirement.
+    // Measured figures are on the page (`accuracy.md`); the limits are those of the requirement.
     assert!(s.position_mm[0] < 2.0 && s.position_mm[1] < 8.0, "{s:?}");
     assert!(s.angle_deg[0] < 3.0 && s.angle_deg[1] < 12.0, "{s:?}");
     assert!(s.force[0] < 0.1, "{s:?}");
@@ -56,6 +58,25 @@ fn closed_forms_hold_to_the_time_step() {
         };
         assert!((measure.ours / reference - 1.0).abs() < limit, "{measure:?}");
     }
+}
+
+#[test]
+fn parts_of_the_hand_that_are_left_out_do_not_matter() {
+    let mut left_out = 0;
+    for (scene, _) in scenes::load(&root()).expect("record") {
+        let config = scene.config(&world());
+        let all = scene.tool.shapes();
+        let pose = ToolPose { position_m: scene.tool_m, orientation: [0.0, 0.0, 0.0, 1.0] };
+        let target = std::array::from_fn(|i| scene.tool_m[i] + scenes::MOVE_M * scene.direction[i]);
+        let obstacle = scene.obstacle.as_ref();
+        let near = parts_in_reach(&config, &scene.theta, &scene.object, obstacle, &pose, target, &all);
+        left_out += all.len() - near.len();
+        let (whole, part) = (scene.simulate(&config, &all), scene.simulate(&config, &near));
+        let (position, angle) = scenes::pose_error(&whole.object, &part.object, true);
+        // The engine may order the contacts that remain in another way.
+        assert!(position < 2e-4 && angle < 5e-3, "{}: {position} m, {angle} rad apart", scene.name);
+    }
+    assert!(left_out >= 10, "only {left_out} parts are left out: nothing was tested");
 }
 
 #[test]

@@ -36,6 +36,7 @@ mod friction;
 pub mod heuristic;
 pub mod model;
 mod motion;
+pub mod parameters;
 mod perturb;
 pub mod reward;
 pub mod robot;

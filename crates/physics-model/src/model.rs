@@ -219,10 +219,10 @@ impl PushModel {
             particle.state.joints_rad = joints;
         } else if let Some(joints) = goal_joints {
             // A move that was stopped early ends on the way to its target.
-            particle.state.joints_rad = if report.events.large_force {
-                self.joints_for(&particle.state.joints_rad, end.tool_m).unwrap_or(joints)
-            } else {
+            particle.state.joints_rad = if end.tool_m == target {
                 joints
+            } else {
+                self.joints_for(&particle.state.joints_rad, end.tool_m).unwrap_or(joints)
             };
         }
         particle.force = sensor.mean(&particle.state.joints_rad);
@@ -253,26 +253,33 @@ impl PushModel {
         let moves = start != target;
         let (mut object, mut obstacle) = (particle.state.object, particle.state.obstacle);
         let all_quiet = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &course.tool, target);
+        let shapes = self.robot.tool_shapes();
+        if !all_quiet
+            && check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &course.tool, shapes).is_err()
+        {
+            report.divergence = Some(Divergence::Overlaps);
+            return End { object, obstacle, tool_m: start, arm_joints_rad: None };
+        }
         let mut world: Option<World> = None;
         let mut ended = false;
-        let (mut position, mut share, mut stopped) = (start, 0.0, !moves);
+        // How many control steps of its path the tool has made, and whether it still goes on.
+        let (mut made, mut position, mut share, mut stopped) = (0, start, 0.0, !moves);
         for step in 1..=steps {
             let time = f64::from(step) / f64::from(steps);
             let tool = ToolPose { position_m: position, ..course.tool };
-            let before = (position, share);
             if !stopped {
-                share = minimum_jerk(time);
-                position = std::array::from_fn(|i| start[i] + share * (target[i] - start[i]));
+                made = step;
             }
+            share = if moves { minimum_jerk(f64::from(made) / f64::from(steps)) } else { share };
+            position = std::array::from_fn(|i| start[i] + share * (target[i] - start[i]));
             let quiet = all_quiet
                 || ended
                 || (world.is_none() && self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, position));
-            let wrench = if quiet {
-                Wrench::default()
+            let (wrench, against) = if quiet {
+                (Wrench::default(), false)
             } else {
                 let world = world.get_or_insert_with(|| {
                     let (theta, obstacle) = (&particle.theta, obstacle.as_ref());
-                    let shapes = self.robot.tool_shapes();
                     let shapes = parts_in_reach(world_config, theta, &object, obstacle, &tool, target, shapes);
                     let world = World::restore(world_config, &self.effects, theta, &object, obstacle, &tool, &shapes);
                     match &self.config.arm {
@@ -288,22 +295,23 @@ impl PushModel {
                 };
                 report.tool_touched |= wrench.force_magnitude_n() > 0.0;
                 report.obstacle_touched |= world.obstacle_touched();
-                wrench
+                let normal = world.normal_force_n();
+                (wrench, (0..3).map(|i| normal[i] * (target[i] - start[i])).sum::<f64>() < 0.0)
             };
             let large =
                 if stopped { sensor.add_stopped(share, &wrench) } else { sensor.add(time, duration_secs, &wrench) };
-            let against = (0..3).map(|i| wrench.force_n[i] * (target[i] - start[i])).sum::<f64>() < 0.0;
-            if large && !stopped && against {
-                // The arm's collision reaction: it goes back to where the force was bearable and stays there. A force that does not oppose
-                // the move is left behind by it.
-                report.events.large_force = true;
+            report.events.large_force |= large;
+            if large && against {
+                // The arm's collision reaction: it goes back along its path, step by step, to where the force is bearable, and stays there. A
+                // force that does not push against the move is left behind by it.
                 stopped = true;
-                (position, share) = before;
+                made = made.saturating_sub(1);
             }
             if step % QUIET_CHECK_STEPS == 0
                 && !ended
                 && let Some(world) = &world
             {
+                report.divergence = report.divergence.or_else(|| world.divergence());
                 let (object, obstacle) = (world.object(), world.obstacle());
                 let tool = ToolPose { position_m: position, ..course.tool };
                 let end = if stopped { position } else { target };
@@ -325,8 +333,7 @@ impl PushModel {
                     Some(joints) => self.tool_pose(joints),
                     None => ToolPose { position_m: position, ..course.tool },
                 };
-                let shapes = self.robot.tool_shapes();
-                report.divergence = world.divergence().or_else(|| {
+                report.divergence = report.divergence.or_else(|| world.divergence()).or_else(|| {
                     check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &tool, shapes)
                         .is_err()
                         .then_some(Divergence::Overlaps)

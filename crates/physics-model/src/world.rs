@@ -94,6 +94,7 @@ pub struct World<'a> {
     tool_colliders: Vec<ColliderHandle>,
     /// Lowest point of the tool from its centre, m, base axes.
     tool_lowest: Vector,
+    normal_n: [f64; 3],
     object: Body,
     obstacle: Option<Body>,
     arm: Option<Arm<'a>>,
@@ -177,6 +178,7 @@ impl<'a> World<'a> {
             tool: tool_body,
             tool_colliders,
             tool_lowest: lowest_point(tool, tool_shapes),
+            normal_n: [0.0; 3],
             object: object_body,
             obstacle: obstacle_body,
             arm: None,
@@ -202,8 +204,16 @@ impl<'a> World<'a> {
         self.physics.bodies[self.tool].set_next_kinematic_translation(vector(position_m));
         self.physics.step_with_events(&OpposeSlip, &());
         let mut wrench = self.tool_wrench(position_m, self.config.arm_stiffness_npm);
-        wrench.add_scaled(&table_wrench(self.config, position_m, self.tool_lowest), 1.0);
+        let table = table_wrench(self.config, position_m, self.tool_lowest);
+        wrench.add_scaled(&table, 1.0);
+        self.normal_n[2] += table.force_n[2];
         wrench
+    }
+
+    /// The part of the last step's force on the tool that acts along the contact normals, N: without friction.
+    #[must_use]
+    pub fn normal_force_n(&self) -> [f64; 3] {
+        self.normal_n
     }
 
     /// Advances one control step, at whose end the dynamic arm's joints are commanded to be at `joints_rad`. Returns the mean wrench on
@@ -221,10 +231,13 @@ impl<'a> World<'a> {
         self.tool_wrench(self.tool_position_m(), 0.0)
     }
 
-    fn tool_wrench(&self, center_m: [f64; 3], stiffness_npm: f64) -> Wrench {
+    fn tool_wrench(&mut self, center_m: [f64; 3], stiffness_npm: f64) -> Wrench {
         let (physics, period_secs) = (&self.physics, self.config.control_period_secs);
         let tool = &self.tool_colliders;
-        tool_wrench(&physics.narrow_phase, &physics.colliders, tool, center_m, period_secs, stiffness_npm)
+        let (wrench, normal_n) =
+            tool_wrench(&physics.narrow_phase, &physics.colliders, tool, center_m, period_secs, stiffness_npm);
+        self.normal_n = normal_n;
+        wrench
     }
 
     /// Joint positions of the dynamic arm, rad.

@@ -351,6 +351,15 @@ fn a_tool_that_meets_something_fixed_feels_the_stiffness_of_the_arm() {
     // The faces meet after 5 mm; contacts are found at the beginning of a step, 2 mm are allowed for: 9 − 5 − 2 = 2 mm of 50 N/mm.
     assert!((force.force_n[1] + 100.0).abs() < 2.0 && force.force_n[0].abs() < 1.0, "{:?}", force.force_n);
     assert!(world.obstacle_touched());
+    // However many contact points and parts share it: a capsule flat on the face, two balls side by side.
+    let capsule = ToolShape::Capsule { a_m: [-0.03, 0.0, 0.0], b_m: [0.03, 0.0, 0.0], radius_m: 0.025 };
+    let ball = |x: f64| ToolShape::Ball { center_m: [x, 0.0, 0.0], radius_m: 0.025 };
+    for shapes in [vec![capsule], vec![ball(-0.02), ball(0.02)]] {
+        let mut world = World::restore(&config, &[], &theta, &body, Some(&obstacle), &tool(start), &shapes);
+        world.step([0.0, 0.008, 0.04]);
+        let force = world.step([0.0, 0.008, 0.04]);
+        assert!((force.force_n[1] + 50.0).abs() < 2.0, "{shapes:?}: {:?}", force.force_n);
+    }
     // The table likewise, 3 mm deep.
     let mut world = restore(&config, &[], &theta, &body, [0.0, 0.0, 0.03]);
     let force = world.step([0.0, 0.0, 0.022]);

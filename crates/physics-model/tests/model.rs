@@ -127,6 +127,67 @@ fn an_arm_stopped_by_an_obstacle_can_retreat_and_stays_out_of_it() {
 }
 
 #[test]
+fn an_arm_that_squeezes_an_object_stays_near_its_limit_and_can_leave() {
+    for mass_kg in [0.2, 0.5, 2.0] {
+        let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+        let mut particle = with_obstacle(particle(&model, &joints, -0.1), -0.01);
+        particle.theta.object.mass_kg = mass_kg;
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        let mut large = 0;
+        for _ in 0..12 {
+            let report = model.act(&mut particle, Action::ALL[PLUS_Y], &mut rng).1;
+            large += u32::from(report.events.large_force);
+            assert_eq!(report.divergence, None, "{mass_kg} kg");
+            // The mean of an action, whose force passes the limit for a control step or two.
+            let force = particle.force[..3].iter().map(|f| f * f).sum::<f64>().sqrt();
+            assert!(force < 120.0, "{mass_kg} kg: the wrist holds {force} N");
+        }
+        assert!(large >= 3, "{mass_kg} kg: the push is blocked: {large}");
+        // Back, back to both sides, and up. Sideways along a squeezed object the way may get narrower.
+        for action in [5, 6, 7, Action::UP.index()] {
+            let mut leaving = particle.clone();
+            let from = model.tool_position_m(&leaving.state.joints_rad);
+            model.act(&mut leaving, Action::ALL[action], &mut rng);
+            let to = model.tool_position_m(&leaving.state.joints_rad);
+            let way = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt();
+            assert!((way - 0.02).abs() < 1e-4, "{mass_kg} kg, action {action}: left by {way} m");
+        }
+    }
+}
+
+#[test]
+fn a_force_above_the_limit_is_reported_whether_it_opposes_the_move_or_not() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let tool = model.tool_position_m(&joints);
+    // A fixed face 5 mm inside the tool's ball: 150 N along −y.
+    let mut start = with_obstacle(particle(&model, &joints, 0.2), 0.0);
+    start.state.obstacle.as_mut().unwrap().position_m = [tool[0], tool[1] + 0.025 + 0.04 - 0.005, tool[2]];
+    assert_eq!(model.check(&start), Ok(()));
+    for (action, stays) in [(0, false), (PLUS_Y, true), (Action::UP.index(), false)] {
+        let mut particle = start.clone();
+        let (step, report) = model.act(&mut particle, Action::ALL[action], &mut Seed(1).stream(Purpose::Test, 0));
+        assert!(report.events.large_force && step.reward == -6.0, "action {action}: {step:?}");
+        let to = model.tool_position_m(&particle.state.joints_rad);
+        let way = (0..3).map(|i| (to[i] - tool[i]).powi(2)).sum::<f64>().sqrt();
+        assert_eq!(way < 1e-4, stays, "action {action} moved the tool by {way} m");
+    }
+}
+
+#[test]
+fn overlapping_bodies_are_simulated_and_impossible_ones_refused() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let overlapping = |depth_m: f64| {
+        let mut particle = with_obstacle(particle(&model, &joints, 0.1), 0.18 - depth_m);
+        let report = model.act(&mut particle, Action::ALL[PLUS_Y], &mut Seed(1).stream(Purpose::Test, 0)).1;
+        (0.1 - particle.state.object.position_m[1], report.divergence)
+    };
+    assert_eq!(overlapping(0.0).0, 0.0, "bodies that only touch rest");
+    let (moved, divergence) = overlapping(0.004);
+    assert!(moved > 0.001 && divergence.is_none(), "pushed apart by {moved} m");
+    assert_eq!(overlapping(0.02).1, Some(physics_model::world::Divergence::Overlaps));
+}
+
+#[test]
 fn what_is_skipped_before_and_after_a_contact_changes_nothing() {
     let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
     // The ball's surface is 6 mm from the box: the first half of the move meets nothing.

@@ -28,7 +28,7 @@ impl NodeId {
 
 /// What is known of one action at one node. Sixteen bytes, for a simulation reads all slots of every node it passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slot {
+pub(crate) struct Slot {
     pub(crate) value: f64,
     visits: u32,
     /// First branch, or [`NodeId::NONE`].

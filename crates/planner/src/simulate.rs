@@ -52,7 +52,10 @@ impl Share {
                 // Threads take the trees in turns; a turn lasts as long for every tree.
                 let turns = config.trees.div_ceil(config.threads.min(config.trees));
                 let turn = Duration::from_millis(n) / u32::try_from(turns).unwrap_or(u32::MAX);
-                #[expect(clippy::disallowed_methods, reason = "a budget of wall-clock time is documented as not reproducible")]
+                #[expect(
+                    clippy::disallowed_methods,
+                    reason = "a budget of wall-clock time is documented as not reproducible"
+                )]
                 Self::Until(Instant::now() + turn)
             }
         }
@@ -63,7 +66,10 @@ impl Share {
         match self {
             Self::Simulations(n) => tally.simulations < n,
             Self::Transitions(n) => tally.transitions + depth <= n,
-            #[expect(clippy::disallowed_methods, reason = "a budget of wall-clock time is documented as not reproducible")]
+            #[expect(
+                clippy::disallowed_methods,
+                reason = "a budget of wall-clock time is documented as not reproducible"
+            )]
             Self::Until(deadline) => tally.simulations == 0 || Instant::now() < deadline,
         }
     }

@@ -135,7 +135,8 @@ fn the_test_model_conforms() {
 #[test]
 fn an_invalid_config_makes_no_planner() {
     let error = Pomcp::<Noise>::new(config(Budget::Transitions(3), 4)).err();
-    let expected = Error::Config { key: "budget.transitions", value: "3".into(), limit: "at least depth × trees = 4".into() };
+    let expected =
+        Error::Config { key: "budget.transitions", value: "3".into(), limit: "at least depth × trees = 4".into() };
     assert_eq!(error, Some(expected));
 }
 

@@ -131,8 +131,8 @@ mod tests {
     use pomdp::{Purpose, Seed, UniformPolicy};
 
     use super::*;
-    use crate::rock_sample::{Action, Observation};
     use crate::RockSample;
+    use crate::rock_sample::{Action, Observation};
 
     fn rng() -> Rng {
         Seed(1).stream(Purpose::Test, 0)

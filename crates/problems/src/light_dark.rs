@@ -127,14 +127,15 @@ mod tests {
             let errors: Vec<f64> = (0..n)
                 .map(|_| LightDark.step(&mut { place - 1 }, &1, &mut rng).observation - f64::from(place))
                 .collect();
-            let (mean, variance) = (
-                errors.iter().sum::<f64>() / f64::from(n),
-                errors.iter().map(|e| e * e).sum::<f64>() / f64::from(n),
-            );
+            let (mean, variance) =
+                (errors.iter().sum::<f64>() / f64::from(n), errors.iter().map(|e| e * e).sum::<f64>() / f64::from(n));
             // Standard errors: σ/√n of the mean, σ/√(2n) of the standard deviation; tolerance 4 of them.
             if place != 11 {
                 assert!(mean.abs() < 4.0 * stddev / f64::from(n).sqrt(), "{place}: mean {mean}");
-                assert!((variance.sqrt() - stddev).abs() < 4.0 * stddev / f64::from(2 * n).sqrt(), "{place}: {variance}");
+                assert!(
+                    (variance.sqrt() - stddev).abs() < 4.0 * stddev / f64::from(2 * n).sqrt(),
+                    "{place}: {variance}"
+                );
             }
         }
     }

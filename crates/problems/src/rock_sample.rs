@@ -100,8 +100,7 @@ impl RockSample {
     /// RockSample(11, 11) as in POMCP 1.0.
     #[must_use]
     pub fn standard_11_11() -> Self {
-        let rocks =
-            [[0, 3], [0, 7], [1, 8], [2, 4], [3, 3], [3, 8], [4, 3], [5, 8], [6, 1], [9, 3], [9, 9]];
+        let rocks = [[0, 3], [0, 7], [1, 8], [2, 4], [3, 3], [3, 8], [4, 3], [5, 8], [6, 1], [9, 3], [9, 9]];
         Self::new(11, [0, 5], &rocks)
     }
 
@@ -377,9 +376,10 @@ mod tests {
         use Action::{East, North, South, West};
         let problem = RockSample::standard_7_8();
         let mut state = problem.state(|_| true);
-        assert_eq!(run(&problem, &mut state, &[West, North, North, North, North, East, South]), [
-            -100.0, 0.0, 0.0, 0.0, -100.0, 0.0, 0.0
-        ]);
+        assert_eq!(
+            run(&problem, &mut state, &[West, North, North, North, North, East, South]),
+            [-100.0, 0.0, 0.0, 0.0, -100.0, 0.0, 0.0]
+        );
         assert_eq!(problem.place(&state), [1, 5]);
         assert_eq!(run(&problem, &mut state, &[South; 6]), [0.0, 0.0, 0.0, 0.0, 0.0, -100.0]);
         assert_eq!(run(&problem, &mut state, &[East; 5]), [0.0; 5]);

@@ -111,7 +111,10 @@ impl Tag {
         };
         let corners = [[0, 0], [0, 1], [9, 0], [9, 1], [5, 4], [7, 4]];
         Self {
-            flight: (0..CELLS).flat_map(|agent| (0..CELLS).map(move |o| (agent, o))).map(|(a, o)| flight(a, o)).collect(),
+            flight: (0..CELLS)
+                .flat_map(|agent| (0..CELLS).map(move |o| (agent, o)))
+                .map(|(a, o)| flight(a, o))
+                .collect(),
             neighbour,
             corner: std::array::from_fn(|cell| corners.contains(&place(cell as u8))),
         }

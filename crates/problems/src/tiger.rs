@@ -183,7 +183,9 @@ mod tests {
             });
             assert!((right.count() as f64 - 8500.0).abs() < 143.0);
             let log = |growl| RESTARTING.log_likelihood(&Action::Listen, &tiger, &growl);
-            assert!((log(tiger).exp() - 0.85).abs() < 1e-12 && (log(true).exp() + log(false).exp() - 1.0).abs() < 1e-12);
+            assert!(
+                (log(tiger).exp() - 0.85).abs() < 1e-12 && (log(true).exp() + log(false).exp() - 1.0).abs() < 1e-12
+            );
         }
     }
 

@@ -15,12 +15,14 @@ mod error;
 mod load;
 mod provenance;
 mod schema;
+mod tracker;
 
 pub use assemble::Problem;
 pub use error::Error;
 pub use load::{Selection, find_root};
 pub use provenance::commit;
 pub use schema::{
-    AgentConfig, ArmsConfig, DataConfig, EffectsConfig, EvaluationConfig, InitialBeliefConfig, InitialObstacle,
-    Published, Scenario, VERSION,
+    AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,
+    InitialObstacle, Published, Scenario, VERSION,
 };
+pub use tracker::Tracker;

@@ -83,7 +83,8 @@ impl Selection {
         let problem = scenario
             .problem()
             .or_else(|| scenario.planner.validate().err().map(|e| e.to_string()))
-            .or_else(|| scenario.belief.validate().err().map(|e| e.to_string()));
+            .or_else(|| scenario.belief.rejection.validate().err().map(|e| e.to_string()))
+            .or_else(|| scenario.belief.weighted.validate().err().map(|e| e.to_string()));
         match problem {
             Some(problem) => {
                 let key = problem.split(':').next().unwrap_or_default();

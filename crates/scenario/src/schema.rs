@@ -45,7 +45,7 @@ pub struct Scenario {
     /// What the robot believes at first.
     pub initial_belief: InitialBeliefConfig,
     /// Particle filter.
-    pub belief: belief::Config,
+    pub belief: BeliefConfig,
     /// Search.
     pub planner: planner::Config,
     /// The loop around them.
@@ -74,6 +74,48 @@ pub struct EffectsConfig {
     pub truth: Vec<EffectConfig>,
     /// In the model that plans and filters.
     pub model: Vec<EffectConfig>,
+}
+
+/// Which filter keeps the belief.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Filter {
+    /// As published: [`belief::RejectionFilter`].
+    Rejection,
+    /// [`belief::WeightedFilter`].
+    Weighted,
+}
+
+/// Filters of the belief: all are set, one is used.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeliefConfig {
+    /// The one that is used.
+    pub filter: Filter,
+    /// Rejection filter.
+    pub rejection: belief::Config,
+    /// Weighted filter.
+    pub weighted: belief::WeightedConfig,
+}
+
+impl BeliefConfig {
+    /// Particles of the first belief.
+    #[must_use]
+    pub fn particles(&self) -> usize {
+        match self.filter {
+            Filter::Rejection => self.rejection.particles,
+            Filter::Weighted => self.weighted.particles_max,
+        }
+    }
+
+    /// Most transitions that an update simulates, restarts apart.
+    #[must_use]
+    pub fn transitions(&self) -> usize {
+        match self.filter {
+            Filter::Rejection => self.rejection.max_attempts,
+            Filter::Weighted => self.weighted.max_transitions,
+        }
+    }
 }
 
 /// What the initial belief says of the obstacle.
