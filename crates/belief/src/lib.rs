@@ -2,7 +2,9 @@
 //!
 //! [`Particles`] is the belief; [`RejectionFilter`] is the update of the `paper` preset: simulate particles and keep those whose
 //! observation falls into the class of the real one (Silver and Veness 2010), reinvigorate with artificial noise where they run
-//! out, and take in particles suggested from outside. Depletion is a typed error, never an empty belief.
+//! out, and take in particles suggested from outside. [`WeightedFilter`] is that of the `surmise` preset: likelihood weights on continuous
+//! observations, tempering, smoothed static parameters and quotas per structure, proposals with importance weights, restarts. Depletion is
+//! a typed error, never an empty belief.
 //!
 //! # Example
 //!

@@ -27,6 +27,12 @@ fn the_test_models_conform() {
     conformance::check_generative_model(&Hmm::vague(), &[0, 1, 2], 50);
     let line = LinearGaussian { gain: 0.9, process_stddev: 0.3, observation_stddev: 0.5 };
     conformance::check_generative_model(&line, &[0.0, 1.0], 20);
+    conformance::check_observation_model(&line, &[0.0, 3.0], 100);
+    for model in [Hmm::vague(), Hmm::sharp()] {
+        conformance::check_observation_model(&model, &[0, 1, 2], 500);
+        conformance::check_discrete_likelihoods(&model, &[0, 1, 2], 5, &[0, 1]);
+        conformance::check_discretise(&model, &[0, 1, 2], 20);
+    }
 }
 
 /// A draw from the belief after every step of `episodes` independent filters, against the exact posterior; and the mean of the ratio of

@@ -36,6 +36,11 @@ fn the_test_model_conforms() {
     let model = problem(0.1);
     let states: Vec<Thing> = (0..20).map(|_| model.sample(&mut rng)).collect();
     conformance::check_generative_model(&model, &states, 8);
+    conformance::check_observation_model(&model, &states, 20);
+    conformance::check_perturb(&model, &states, 20, |_| true);
+    conformance::check_perturb_is_centred(&model, &states[0], 2000, |thing| thing.theta.clone());
+    conformance::check_static_parameters(&model, &states, 1e-12);
+    conformance::check_parameters_stay(&model, &states, 8, 0.0);
 }
 
 /// Simulation-based calibration (Talts et al. 2018) over `episodes` worlds drawn from the prior.

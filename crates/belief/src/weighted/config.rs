@@ -119,7 +119,8 @@ pub(crate) mod tests {
             config.validate().unwrap_err().to_string()
         };
         assert_eq!(config().validate(), Ok(()));
-        let cases: [(fn(&mut WeightedConfig), &str); 13] = [
+        type Change = fn(&mut WeightedConfig);
+        let cases: [(Change, &str); 13] = [
             (|c| c.particles_min = 0, "`particles_min` is 0, but must be at least 1"),
             (|c| c.particles_max = 99, "`particles_max` is 99, but must be at least particles_min = 100"),
             (|c| c.kld_error = 0.0, "`kld_error` is 0, but must be above 0"),

@@ -16,6 +16,9 @@ const BISECTIONS: usize = 30;
 /// First step of the moves, as a share of the kernel's width.
 const FIRST_STEP: f64 = 0.7;
 
+/// Walkers with ln weights before the likelihood.
+type Weighted<S> = (Vec<Walker<S>>, Vec<f64>);
+
 /// φ ln g, where an impossible observation stays impossible at φ = 0.
 fn tempered(exponent: f64, log_likelihood: f64) -> f64 {
     if log_likelihood == f64::NEG_INFINITY { log_likelihood } else { exponent * log_likelihood }
@@ -139,7 +142,7 @@ fn first_stage<M: Trackable>(
     pilot: &[Walker<M::State>],
     offers: &Offers<M::State>,
     rng: &mut Rng,
-) -> Option<(Vec<Walker<M::State>>, Vec<f64>)> {
+) -> Option<Weighted<M::State>> {
     let prior = &round.prediction.weights;
     let at = |by: f64| prior.iter().zip(pilot).map(move |(w, p)| w.ln() + tempered(by, p.log_likelihood));
     let by = exponent(1.0, round.config.tempering_share * prior.len() as f64, |by| log_effective_sample_size(at(by)));
