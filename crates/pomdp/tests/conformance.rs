@@ -63,7 +63,7 @@ impl GenerativeModel for Lamp {
         if self.0 == StepMovesParameters {
             state.share *= 0.99;
         }
-        let on = rng.random_bool(state.share) ^ (self.0 == SharedState && self.1.get() % 2 == 0);
+        let on = rng.random_bool(state.share) ^ (self.0 == SharedState && self.1.get().is_multiple_of(2));
         let reward = if self.0 == InfiniteReward { f64::INFINITY } else { 0.0 };
         Step { observation: on, reward, outcome: Outcome::Continue }
     }
