@@ -5,7 +5,7 @@ use physics_model::{Action, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::Pomcp;
 use pomdp::{Discretise as _, Outcome, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
 use prior::Suggester;
-use scenario::{Problem, Tracker};
+use scenario::{Filter, Problem, Tracker};
 
 use crate::{Episode, Error, Method, Reason, StepRecord, World};
 
@@ -41,10 +41,14 @@ impl<'a> Agent<'a> {
     ///
     /// # Errors
     ///
-    /// [`Error::NoPrior`] where the method needs one and none is given.
+    /// [`Error::NoPrior`] where the method needs one and none is given; [`Error::NoDensity`] where the filter could not weigh what it
+    /// suggests.
     pub fn new(problem: &'a Problem, method: Method, prior: Option<&Suggester>) -> Result<Self, Error> {
         if method.needs_prior() && prior.is_none() {
             return Err(Error::NoPrior { method: method.name() });
+        }
+        if method.needs_prior() && problem.scenario.belief.filter == Filter::Weighted {
+            return Err(Error::NoDensity { method: method.name() });
         }
         let prior = if method.needs_prior() { prior.cloned() } else { None };
         Ok(Self { problem, method, prior })

@@ -21,6 +21,14 @@ pub enum Error {
         /// Method.
         method: &'static str,
     },
+    /// The weighted filter needs the density that suggestions were drawn from, which the prior does not give.
+    #[error(
+        "method {method} does not go with belief.filter = \"weighted\", which needs the density of the prior's suggestions: use no-rnn, oracle or heuristic"
+    )]
+    NoDensity {
+        /// Method.
+        method: &'static str,
+    },
     /// The oracle was asked of a world that does not know its own truth.
     #[error("method oracle needs a world that knows its true state")]
     NoTruth,

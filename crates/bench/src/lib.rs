@@ -5,6 +5,7 @@
 //! `crates/physics-model/tests/data`, so that accuracy needs no Python.
 
 pub mod accuracy;
+pub mod belief;
 pub mod closed_forms;
 pub mod peer;
 pub mod physics;

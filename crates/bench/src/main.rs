@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
-use bench::report;
+use bench::{belief, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
 use serde_json::Value;
@@ -34,6 +34,21 @@ enum What {
         /// Prints one JSON object.
         #[arg(long)]
         json: bool,
+    },
+    /// The filters of the presets on the pushing task: depletion, effective size, errors of the estimated parameters.
+    Belief {
+        /// Domain: D1 to D5, or a scenario file.
+        #[arg(long, default_value = "D4")]
+        domain: String,
+        /// Worlds.
+        #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+        episodes: u32,
+        /// Root seed.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// The small budgets of --quick runs.
+        #[arg(long)]
+        quick: bool,
     },
     /// Errors against MuJoCo's recorded answers and closed forms: the page in the docs of physics-model.
     Accuracy {
@@ -70,6 +85,12 @@ fn run(arguments: &Arguments) -> Result<()> {
             } else {
                 print!("{}", table(&result));
             }
+        }
+        What::Belief { domain, episodes, seed, quick } => {
+            let task =
+                belief::Task { domain: domain.clone(), episodes: u64::from(*episodes), seed: *seed, quick: *quick };
+            let result = belief::run(&root, &task, |text| eprintln!("{text}"))?;
+            println!("{}", serde_json::to_string_pretty(&result)?);
         }
         What::Accuracy { write, set } => {
             let selection = Selection { set: set.clone(), ..Selection::new(&root) };

@@ -23,7 +23,11 @@ pub struct Peer {
 impl Peer {
     /// The peer of `tests/peers/SCRIPT`, if it is installed for the Python of the variable `PYTHON`, or `python3`. Where it is not, the script says
     /// what is missing, which goes to `note`.
-    pub fn find(root: &Path, script: &str, arguments: &[&str], note: &mut impl FnMut(&str)) -> Option<Self> {
+    ///
+    /// # Errors
+    ///
+    /// The peer is installed, but fails.
+    pub fn find(root: &Path, script: &str, arguments: &[&str], note: &mut impl FnMut(&str)) -> Result<Option<Self>> {
         let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
         let peer = Self {
             python,
@@ -32,11 +36,12 @@ impl Peer {
             version: OnceLock::new(),
         };
         match peer.call(1) {
-            Ok(_) => Some(peer),
-            Err(error) => {
+            Ok(_) => Ok(Some(peer)),
+            Err(error) if error.to_string().starts_with("missing:") => {
                 note(&format!("{error:#}"));
-                None
+                Ok(None)
             }
+            Err(error) => Err(error),
         }
     }
 

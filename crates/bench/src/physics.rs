@@ -218,8 +218,8 @@ pub struct Scaling {
 /// A scenario that does not load, or a peer that is installed but fails.
 pub fn run(root: &Path, effort: Effort, mut note: impl FnMut(&str)) -> Result<Value> {
     let scenario = Selection::new(root).load()?;
-    let mujoco = Peer::find(root, "mujoco_bench.py", &["--substeps", "1", "2"], &mut note);
-    let pybullet = Peer::find(root, "pybullet_bench.py", &["--substeps", "1", "2"], &mut note);
+    let mujoco = Peer::find(root, "mujoco_bench.py", &["--substeps", "1", "2"], &mut note)?;
+    let pybullet = Peer::find(root, "pybullet_bench.py", &["--substeps", "1", "2"], &mut note)?;
     let cases: Vec<(&str, &str, Case)> = OBSTACLES
         .iter()
         .flat_map(|obstacle| TOOLS.iter().map(move |(tool, shape)| (*obstacle, *tool, *shape)))

@@ -75,7 +75,7 @@ pub fn page(root: &Path, world: &WorldConfig) -> Result<String> {
     let _ = writeln!(
         page,
         "\nA body that friction stops ends v h / 2 short (h: substep), because its position follows the speed at the end of each substep: \
-         that is the whole error of the slide and of the spin.\n"
+         3.3 % of the slide and 11.6 % of the spin.\n"
     );
     let _ = writeln!(
         page,

@@ -64,7 +64,8 @@ fn closed_forms_hold_to_the_time_step() {
 fn parts_of_the_hand_that_are_left_out_do_not_matter() {
     let mut left_out = 0;
     for (scene, _) in scenes::load(&root()).expect("record") {
-        let config = scene.config(&world());
+        // Many iterations: with few, the order in which the engine takes the contacts that remain shows (0.2 mm).
+        let config = WorldConfig { solver_iterations: 16, ..scene.config(&world()) };
         let all = scene.tool.shapes();
         let pose = ToolPose { position_m: scene.tool_m, orientation: [0.0, 0.0, 0.0, 1.0] };
         let target = std::array::from_fn(|i| scene.tool_m[i] + scenes::MOVE_M * scene.direction[i]);
@@ -73,8 +74,7 @@ fn parts_of_the_hand_that_are_left_out_do_not_matter() {
         left_out += all.len() - near.len();
         let (whole, part) = (scene.simulate(&config, &all), scene.simulate(&config, &near));
         let (position, angle) = scenes::pose_error(&whole.object, &part.object, true);
-        // The engine may order the contacts that remain in another way.
-        assert!(position < 2e-4 && angle < 5e-3, "{}: {position} m, {angle} rad apart", scene.name);
+        assert!(position < 5e-5 && angle < 1e-3, "{}: {position} m, {angle} rad apart", scene.name);
     }
     assert!(left_out >= 10, "only {left_out} parts are left out: nothing was tested");
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use agent::Method;
+use agent::{Agent, Method};
 use anyhow::{Context as _, Result};
 use clap::Parser;
 use experiments::{Provenance, Run, RunIdentity, play};
@@ -14,7 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
 use prior::Suggester;
 use rayon::prelude::*;
-use scenario::{Problem, Scenario, Selection};
+use scenario::{Filter, Problem, Scenario, Selection};
 
 /// Plays trials of methods on a domain and prints the table.
 #[derive(Debug, Parser)]
@@ -29,8 +29,9 @@ struct Arguments {
     /// Preset of belief and planner.
     #[arg(long, default_value = "paper")]
     preset: String,
-    /// Methods, separated by commas: no-rnn, rnn-max, rnn-sampling, oracle, heuristic.
-    #[arg(long, value_delimiter = ',', default_value = "no-rnn,rnn-max,rnn-sampling")]
+    /// Methods, separated by commas: no-rnn, rnn-max, rnn-sampling, oracle, heuristic [default: no-rnn,rnn-max,rnn-sampling;
+    /// no-rnn with preset surmise].
+    #[arg(long, value_delimiter = ',')]
     methods: Vec<Method>,
     /// Trials a method [default: the scenario's].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -107,6 +108,12 @@ fn run(arguments: &Arguments) -> Result<bool> {
         scenario.evaluation.trials = trials;
     }
     let mut methods = arguments.methods.clone();
+    if methods.is_empty() {
+        methods = match scenario.belief.filter {
+            Filter::Rejection => vec![Method::NoRnn, Method::RnnMax, Method::RnnSampling],
+            Filter::Weighted => vec![Method::NoRnn],
+        };
+    }
     methods.sort();
     methods.dedup();
     let problem = Problem::assemble(&scenario, &root)?;
@@ -118,6 +125,10 @@ fn run(arguments: &Arguments) -> Result<bool> {
     } else {
         None
     };
+    // What a method cannot do is said before a folder is made.
+    for method in &methods {
+        Agent::new(&problem, *method, prior.as_ref())?;
+    }
     let provenance = Provenance {
         run: RunIdentity {
             version: 1,

@@ -7,8 +7,8 @@
 //! corners is 6 to 14 % short of μ m g.
 //!
 //! The solver takes a surface velocity u for every contact and iterates with v + u in place of v. With
-//! `u = (2 / tr K) K v − v` the fixed point becomes `λ ∥ −v`. The velocity at the beginning of the step stands for v: exact for
-//! steady slip, and 0 where nothing slips, so that sticking contacts do not creep.
+//! `u = (2 / tr K) K v − v` the fixed point becomes `λ ∥ −v`. The velocity at the beginning of the step stands for v (that
+//! of a kinematic tool is one step older): exact for steady slip, and 0 where nothing slips, so that sticking contacts do not creep.
 
 use rapier3d::prelude::{ContactModificationContext, PhysicsHooks, RigidBody, Vector};
 

@@ -7,7 +7,7 @@ use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng
 use serde::{Deserialize, Serialize};
 
 use crate::action::{Action, minimum_jerk};
-use crate::config::{ArmConfig, ForceSensing, PushConfig};
+use crate::config::{ArmConfig, ForceSensing, ObstacleMobility, PushConfig};
 use crate::effect::{Effect, EffectConfig};
 use crate::error::Impossible;
 use crate::feasible::{check_overlaps, check_theta, nothing_happens, parts_in_reach};
@@ -327,7 +327,11 @@ impl PushModel {
                 }
             }
             Some(world) => {
-                (object, obstacle) = (world.object(), world.obstacle());
+                object = world.object();
+                // What cannot move keeps its last digits, which the engine does not have.
+                if world_config.obstacle_mobility == ObstacleMobility::Movable {
+                    obstacle = world.obstacle();
+                }
                 arm_joints_rad = world.arm_joints_rad();
                 let tool = match &arm_joints_rad {
                     Some(joints) => self.tool_pose(joints),

@@ -39,17 +39,19 @@ fn body() -> impl Strategy<Value = BodyState> {
         })
 }
 
-/// Values over the ranges of `check_theta`: magnitudes uniform in their logarithm.
+/// Values within the ranges of `check_theta`: magnitudes uniform in their logarithm, the centre of mass within half of the smallest size.
 fn theta() -> impl Strategy<Value = Theta> {
     let magnitude = |low: f64, high: f64| (low.ln()..high.ln()).prop_map(f64::exp);
+    // Half of the sizes are those of things that a hand could hold: most of the others overlap something from the start.
+    let size = || prop_oneof![magnitude(0.005, 1.0), magnitude(0.02, 0.12)];
     (
         0..3_usize,
         0..4_usize,
         magnitude(0.005, 100.0),
         magnitude(0.005, 1000.0),
         0.0..=1.0_f64,
-        prop::array::uniform3(magnitude(0.005, 1.0)),
-        prop::array::uniform3(magnitude(0.005, 1.0)),
+        prop::array::uniform3(size()),
+        prop::array::uniform3(size()),
         prop::array::uniform3(-0.5..0.5_f64),
     )
         .prop_map(|(shape, obstacle, mass, obstacle_mass, friction, size, obstacle_size, com)| {
@@ -72,22 +74,27 @@ fn check(
     arm: &str,
     mobility: ObstacleMobility,
     problem: &Problem,
-    case: (Theta, BodyState, BodyState, usize),
+    case: (Theta, BodyState, BodyState, usize, bool),
 ) -> Outcome {
     let (model, joints) = problem.get_or_init(|| support::model(arm, mobility));
-    let (theta, object, obstacle, action) = case;
+    let (theta, object, obstacle, action, stand) = case;
     check_theta(&theta).expect("within the documented ranges");
     let tool = model.tool_position_m(joints);
-    let placed = |mut body: BodyState| {
+    let table_m = model.config().world.table_height_m;
+    let placed = |mut body: BodyState, half_height_m: f64| {
         for (coordinate, at) in body.position_m.iter_mut().zip(tool) {
             *coordinate += at;
+        }
+        if stand {
+            body.position_m[2] = table_m + half_height_m;
+            body.orientation = [0.0, 0.0, 0.0, 1.0];
         }
         body
     };
     let state = State {
         joints_rad: joints.clone(),
-        object: placed(object),
-        obstacle: theta.obstacle.is_some().then(|| placed(obstacle)),
+        object: placed(object, theta.object.shape.half_height_m(theta.object.size_m)),
+        obstacle: theta.obstacle.as_ref().map(|o| placed(obstacle, o.shape.half_height_m(o.size_m))),
     };
     let before = Particle::new(state, theta);
     let mut after = before.clone();
@@ -115,7 +122,7 @@ macro_rules! hypotheses {
                 proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha),
             );
             let survived = std::cell::Cell::new(0_u32);
-            let cases = (theta(), body(), body(), 0..10_usize);
+            let cases = (theta(), body(), body(), 0..10_usize, prop::bool::weighted(0.8));
             let result = runner.run(&cases, |case| {
                 let outcome = check($arm, $mobility, &problem, case);
                 survived.set(survived.get() + u32::from(outcome != Outcome::Diverged));

@@ -7,8 +7,10 @@ use physics_model::world::World;
 use physics_model::{
     Action, BodyState, HeuristicPolicy, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushModel, State, Theta,
 };
-use pomdp::conformance::check_generative_model;
-use pomdp::{Outcome, Policy as _, Purpose, Seed};
+use pomdp::conformance::{
+    check_generative_model, check_observation_model, check_parameters_stay, check_static_parameters,
+};
+use pomdp::{Outcome, Policy as _, Purpose, Seed, StaticParameters as _};
 use support::model;
 
 /// Moves along +y and −y.
@@ -46,6 +48,43 @@ fn both_arms_conform_to_the_generative_model() {
         let near = particle(&model, &joints, -0.1);
         let blocked = with_obstacle(near.clone(), 0.0);
         check_generative_model(&model, &[near, blocked], 12);
+    }
+}
+
+#[test]
+fn static_parameters_survive_the_way_to_unconstrained_values_and_back() {
+    for mobility in [ObstacleMobility::Fixed, ObstacleMobility::Movable] {
+        let (model, joints) = model("sawyer", mobility);
+        let mut states = Vec::new();
+        for (shape, size_m, com_m) in [
+            (ObjectShape::Box, [0.08, 0.07, 0.1], [0.01, -0.005, 0.002]),
+            (ObjectShape::Cylinder, [0.04, 0.1, 0.0], [0.01, -0.005, 0.002]),
+            (ObjectShape::Sphere, [0.05, 0.0, 0.0], [0.0, 0.0, -0.01]),
+        ] {
+            let mut particle = particle(&model, &joints, -0.1);
+            particle.theta.object = ObjectTheta { shape, mass_kg: 0.5, com_m, friction: 0.4, size_m };
+            particle.state.object.position_m[2] = model.config().world.table_height_m + shape.half_height_m(size_m);
+            states.push(particle.clone());
+            states.push(with_obstacle(particle, 0.05));
+        }
+        check_static_parameters(&model, &states, 1e-9);
+        if mobility == ObstacleMobility::Fixed {
+            check_parameters_stay(&model, &states, 8, 1e-9);
+        }
+        check_observation_model(&model, &states, 6);
+        let structures: std::collections::BTreeSet<_> = states.iter().map(|s| model.structure(s)).collect();
+        assert_eq!(structures.len(), 6);
+        // Twice as heavy and taller: it goes on standing on the table.
+        let mut values = model.parameters(&states[0]);
+        values[0] += 2.0_f64.ln();
+        values[4] += 1.05_f64.ln();
+        let taller = model.with_parameters(&states[0], &values).expect("a possible world");
+        assert!((taller.theta.object.mass_kg - 1.0).abs() < 1e-12);
+        assert!((taller.state.object.position_m[2] - states[0].state.object.position_m[2] - 0.0025).abs() < 1e-12);
+        // An obstacle grown into the object is no world.
+        let mut values = model.parameters(&states[1]);
+        values[8] += 4.0_f64.ln();
+        assert_eq!(model.with_parameters(&states[1], &values), None);
     }
 }
 
