@@ -83,7 +83,7 @@ fn static_parameters_survive_the_way_to_unconstrained_values_and_back() {
         assert!((taller.state.object.position_m[2] - states[0].state.object.position_m[2] - 0.0025).abs() < 1e-12);
         // An obstacle grown into the object is no world.
         let mut values = model.parameters(&states[1]);
-        values[8] += 4.0_f64.ln();
+        values[9] += 4.0_f64.ln();
         assert_eq!(model.with_parameters(&states[1], &values), None);
     }
 }

@@ -233,7 +233,8 @@ mod tests {
             config.validate().unwrap_err().to_string()
         };
         assert_eq!(config().validate(), Ok(()));
-        let expected: [(fn(&mut Config), &str); 11] = [
+        type Fault = (fn(&mut Config), &'static str);
+        let expected: [Fault; 11] = [
             (|c| c.depth = 0, "`depth` is 0, but must be at least 1"),
             (|c| c.trees = 0, "`trees` is 0, but must be at least 1"),
             (|c| c.threads = 0, "`threads` is 0, but must be at least 1"),
