@@ -233,8 +233,8 @@ mod tests {
             config.validate().unwrap_err().to_string()
         };
         assert_eq!(config().validate(), Ok(()));
-        type Fault = (fn(&mut Config), &'static str);
-        let expected: [Fault; 11] = [
+        type Change = fn(&mut Config);
+        let expected: [(Change, &str); 11] = [
             (|c| c.depth = 0, "`depth` is 0, but must be at least 1"),
             (|c| c.trees = 0, "`trees` is 0, but must be at least 1"),
             (|c| c.threads = 0, "`threads` is 0, but must be at least 1"),

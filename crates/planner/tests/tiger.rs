@@ -4,7 +4,7 @@
 //! observations: the only randomness left is the planner's, and a loss is a wrong decision, not noise of the evaluation.
 
 use planner::{ActionPriors, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth};
-use pomdp::{Purpose, Seed, UniformPolicy};
+use pomdp::{Policy, Purpose, Rng, Seed, UniformPolicy};
 use problems::Tiger;
 use problems::tiger::{Action, Growls, OPTIMAL};
 
@@ -100,7 +100,9 @@ fn the_policy_ending_on_open_reaches_the_value_of_the_infinite_horizon() {
     assert!((values[index(0)] - 3.7702).abs() < 5e-5, "{} by {actions:?}", values[index(0)]);
 }
 
-/// A root value averages over the exploration below it, so it is a biased estimate of V* that rises to it.
+/// The value that a search reports for its root is the mean return of simulations that explore, so it is a biased estimate of V*: it
+/// lies below the optimum at any finite count, by more standard errors the more seeds are averaged, and rises to it. What is unbiased
+/// is a policy's value: the tests above evaluate the planner's decisions exactly, with no standard error at all.
 ///
 /// Null: E[value] ≤ V*, so the mean of n = 8 seeds lies above V* by at most 3 standard errors; and the loss vanishes: 16 times the
 /// simulations leave less than a third of it (a constant bias would leave all of it), and less than 2 points of the 500 that
@@ -126,5 +128,39 @@ fn root_values_rise_to_the_optimal_values() {
         // 5e-5: the published values are rounded.
         assert!(late > -3.0 * error - 5e-5, "horizon {horizon}: {late} ± {error} above the optimum");
         assert!(late <= early / 3.0 + 5e-5 && late < 2.0, "horizon {horizon}: loss {early} became {late}");
+    }
+}
+
+/// Horizons 10 and 20: the optimal policy opens at |k| = 2 for a gain of 1.1 in returns that span more than 1000, and UCB1 learns
+/// what lies below an opened door only as fast as ln N grows: 2^22 simulations do not suffice. What can be asked is that root
+/// values stay below the optimum (three standard errors of eight seeds) and rise.
+#[test]
+fn root_values_of_long_horizons_stay_below_the_optimum_and_rise() {
+    let tiger = Tiger { ends_on_open: false };
+    for (horizon, optimal) in OPTIMAL.into_iter().filter(|(horizon, _)| *horizon >= 10) {
+        let mean_and_error = |simulations| {
+            let value = |seed| {
+                let mut rng = Seed(seed).stream(Purpose::Search, 0);
+                let mut planner = planner(0.1, simulations, horizon);
+                let report = planner.search(&tiger, &Growls(0), &Listens, horizon, &mut rng);
+                assert_eq!(report.action, Action::Listen);
+                report.actions[0].value
+            };
+            let values: Vec<f64> = (1..=8).map(value).collect();
+            let mean = values.iter().sum::<f64>() / 8.0;
+            (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 56.0).sqrt())
+        };
+        let ((early, _), (late, error)) = (mean_and_error(1 << 12), mean_and_error(1 << 16));
+        assert!(late < optimal + 3.0 * error, "horizon {horizon}: {late} ± {error} above {optimal}");
+        assert!(late > early, "horizon {horizon}: {early} became {late}");
+    }
+}
+
+/// Rollouts that cost little.
+struct Listens;
+
+impl Policy<Tiger> for Listens {
+    fn action(&self, _model: &Tiger, _left: &bool, _rng: &mut Rng) -> Action {
+        Action::Listen
     }
 }
