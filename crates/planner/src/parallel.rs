@@ -60,11 +60,12 @@ mod tests {
 
     use super::*;
 
+    /// First draw of every tree, and the caller's next one.
     fn draws(threads: usize, trees: usize) -> (Vec<u64>, u64) {
         let mut rng = Seed(1).stream(Purpose::Test, 0);
-        let mut trees = vec![(); trees];
-        let drawn = for_each(&mut trees, threads, &mut rng, |index, (), rng| rng.next_u64() ^ index as u64);
-        (drawn, rng.next_u64())
+        let drawn = for_each(&mut vec![(); trees], threads, &mut rng, |index, (), rng| (index, rng.next_u64()));
+        assert!(drawn.iter().enumerate().all(|(place, (index, _))| place == *index), "{drawn:?}");
+        (drawn.into_iter().map(|(_, draw)| draw).collect(), rng.next_u64())
     }
 
     #[test]

@@ -447,6 +447,18 @@ fn an_export_shows_the_tree_within_its_limits() {
 }
 
 #[test]
+fn the_range_of_returns_starts_from_the_kept_means() {
+    let mut planner = Pomcp::new(config(Budget::Simulations(1), 1)).unwrap();
+    let mut search =
+        || planner.search(&Noise::new([1.0, 3.0, 2.0]), &START, &UniformPolicy, 1, &mut rng(0)).exploration;
+    assert_eq!(search(), 0.0);
+    search();
+    search();
+    // All three were tried once: before its first return the next search knows means from 1 to 3.
+    assert_eq!(search(), 2.0);
+}
+
+#[test]
 fn a_kept_tree_searched_on_equals_one_longer_search() {
     // With a fixed constant, two searches of one tree draw and count exactly like one search of both budgets.
     let model = Noise::new([1.0, 1.1, 0.9]);
