@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
-use bench::{belief, report};
+use bench::{belief, planner, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
 use serde_json::Value;
@@ -50,6 +50,18 @@ enum What {
         #[arg(long)]
         quick: bool,
     },
+    /// Speed, returns and exact values of the search on the standard problems.
+    Planner {
+        /// Episodes with 2^10 simulations a move; half as many with 2^13, a quarter with 2^15.
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+        episodes: u32,
+        /// Only 2^10 simulations a move.
+        #[arg(long)]
+        quick: bool,
+        /// Prints one JSON object.
+        #[arg(long)]
+        json: bool,
+    },
     /// Errors against MuJoCo's recorded answers and closed forms: the page in the docs of physics-model.
     Accuracy {
         /// Writes the page into the project.
@@ -91,6 +103,15 @@ fn run(arguments: &Arguments) -> Result<()> {
                 belief::Task { domain: domain.clone(), episodes: u64::from(*episodes), seed: *seed, quick: *quick };
             let result = belief::run(&root, &task, |text| eprintln!("{text}"))?;
             println!("{}", serde_json::to_string_pretty(&result)?);
+        }
+        What::Planner { episodes, quick, json } => {
+            let effort = planner::Effort { episodes: *episodes, quick: *quick };
+            let result = planner::run(effort, |text| eprintln!("{text}"))?;
+            if *json {
+                println!("{result}");
+            } else {
+                print!("{}", planner::table(&result));
+            }
         }
         What::Accuracy { write, set } => {
             let selection = Selection { set: set.clone(), ..Selection::new(&root) };

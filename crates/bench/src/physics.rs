@@ -162,7 +162,7 @@ impl Transition {
 }
 
 /// CPU time of this thread, s.
-fn thread_secs() -> f64 {
+pub(crate) fn thread_secs() -> f64 {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }

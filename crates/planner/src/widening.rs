@@ -214,7 +214,7 @@ mod tests {
         }
 
         fn step(&self, state: &mut u32, (): &(), rng: &mut Rng) -> Step<bool> {
-            let observation = (*state % 2 == 0) == rng.random_bool(2.0 / 3.0);
+            let observation = state.is_multiple_of(2) == rng.random_bool(2.0 / 3.0);
             Step { observation, reward: f64::from(*state), outcome: Outcome::Continue }
         }
 
@@ -225,7 +225,7 @@ mod tests {
 
     impl ObservationModel for Numbers {
         fn log_likelihood(&self, (): &(), next: &u32, observation: &bool) -> f64 {
-            if (next % 2 == 0) == *observation { (2.0_f64 / 3.0).ln() } else { (1.0_f64 / 3.0).ln() }
+            if next.is_multiple_of(2) == *observation { (2.0_f64 / 3.0).ln() } else { (1.0_f64 / 3.0).ln() }
         }
     }
 
@@ -242,7 +242,7 @@ mod tests {
             };
             assert_eq!(step.reward, f64::from(state));
             known += 1;
-            agreed += u32::from((state % 2 == 0) == tree.branches[child.index() - 1].observation);
+            agreed += u32::from(state.is_multiple_of(2) == tree.branches[child.index() - 1].observation);
         }
         // Null: two of three. n about 20,000, standard deviation of the share 0.0033; tolerance 5 of them, for draws share states.
         let share = f64::from(agreed) / f64::from(known);
