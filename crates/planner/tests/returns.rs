@@ -46,15 +46,15 @@ where
 
 #[test]
 fn rock_sample_earns_what_it_is_known_to() {
-    // 2^10 simulations a move earn 18.1 ± 0.3; POMCP 1.0 earns 17.5 ± 0.6. Null: at least 18.1 less three standard errors of 60
+    // 2^10 simulations a move earn 18.2 ± 0.5 (n = 200); POMCP 1.0 earns 17.6 ± 1.0 (n = 20). Null: at least 18.2 less three standard errors of 60
     // episodes, about 2.6; at most the 21.47 of SARSOP plus as many.
     let (mean, error) = returns(&RockSample::standard_7_8(), 1024, 20.0, 60);
-    assert!(mean > 18.1 - 3.0 * error && mean < 21.47 + 3.0 * error && error < 1.2, "{mean} ± {error}");
+    assert!(mean > 18.2 - 3.0 * error && mean < 21.47 + 3.0 * error && error < 1.2, "{mean} ± {error}");
 }
 
 #[test]
 fn tag_earns_what_it_is_known_to() {
-    // 2^10 simulations a move earn −7.5 ± 0.4; POMCP 1.0 earns −7.8 ± 0.6 with 2^13. As above, with SARSOP's −6.03.
+    // 2^10 simulations a move earn −7.5 ± 0.6 (n = 100); POMCP 1.0 earns −7.8 ± 0.6 with 2^13. As above, with SARSOP's −6.03.
     let (mean, error) = returns(&Tag::new(), 1024, 10.0, 100);
     assert!(mean > -7.5 - 3.0 * error && mean < -6.03 + 3.0 * error && error < 1.0, "{mean} ± {error}");
 }

@@ -53,7 +53,7 @@ pub enum Knowledge {
     Preferred,
 }
 
-/// What POMCP 1.0 is told about a problem: by default preferred actions in the tree and in rollouts, as in its published results.
+/// What POMCP 1.0 is told about a problem: by default preferred actions alone, in the tree and in rollouts (its «smart» level for both).
 ///
 /// The advice depends on what the agent knows alone: its own place and what it measured, which the states of these problems carry.
 #[derive(Clone, Copy, Debug, PartialEq)]
