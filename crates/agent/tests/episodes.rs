@@ -50,11 +50,39 @@ fn the_same_seed_plays_the_same_episode() {
 }
 
 #[test]
+fn the_weighted_filter_keeps_the_belief_through_an_episode_within_its_transitions() {
+    let set = ["belief.filter=\"weighted\"", "planner.budget={transitions=100}", "task.horizon=8"];
+    let problem = problem("D4", &set);
+    let play = |seed| {
+        let mut agent = Agent::new(&problem, Method::NoRnn, None).unwrap();
+        agent.run(&mut world(&problem, seed), seed).unwrap()
+    };
+    let first = play(Seed(3));
+    assert_eq!(play(Seed(3)), first);
+    assert!(first.steps.len() == 8 || first.reason != Reason::Horizon, "{:?}", first.reason);
+    for step in &first.steps {
+        assert!(step.transitions > 0 && step.transitions <= 100 + problem.scenario.belief.transitions(), "{step:?}");
+    }
+    let updates: Vec<_> = first.steps.iter().filter_map(|s| s.update.as_ref()).collect();
+    assert!(updates.len() >= 4, "{} updates", updates.len());
+    for update in updates {
+        assert!(update.effective_sample_size >= 1.0 && !update.structures.is_empty(), "{update:?}");
+        let total: f64 = update.structures.iter().map(|s| s.posterior).sum();
+        assert!((total - 1.0).abs() < 1e-9, "{total}");
+    }
+}
+
+#[test]
 fn a_method_that_needs_a_prior_says_so() {
     let problem = problem("D1", &[]);
     for method in [Method::RnnMax, Method::RnnSampling] {
         assert!(matches!(Agent::new(&problem, method, None), Err(Error::NoPrior { .. })), "{method:?}");
     }
+    let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let prior = prior::Suggester::load(&root.join("assets/priors/sawyer"), "sawyer", &problem.model).unwrap();
+    let weighted = self::problem("D1", &["belief.filter=\"weighted\""]);
+    let refused = Agent::new(&weighted, Method::RnnSampling, Some(&prior));
+    assert!(matches!(refused, Err(Error::NoDensity { .. })), "the filter needs the density of what is suggested");
 }
 
 /// A world whose object jumps by half a metre: nothing in any belief explains that.

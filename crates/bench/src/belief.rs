@@ -39,7 +39,7 @@ struct Sums {
     updates: u32,
     transitions: usize,
     recoveries: usize,
-    /// Effective size over the number of particles and how many updates that was, by step.
+    /// Effective size before resampling (agreeing particles of a filter without weights) and how many updates that was, by step.
     effective: Vec<(f64, u32)>,
     mass: f64,
     friction: f64,
@@ -81,7 +81,8 @@ pub fn run(root: &Path, task: &Task, mut note: impl FnMut(&str)) -> Result<Value
                 "updates": s.updates,
                 "transitions_per_update": s.transitions as f64 / f64::from(s.updates.max(1)),
                 "most_transitions_per_update": problem.scenario.belief.transitions(),
-                "effective_size_share_by_step": effective,
+                "effective_size_by_step": effective,
+                "particles": problem.scenario.belief.particles(),
                 "object_mass_log_error": s.mass / n,
                 "object_friction_error": s.friction / n,
                 "object_shape_probability": s.shape / n,
@@ -133,13 +134,14 @@ fn track(problem: &Problem, record: &Record, seed: Seed, episode: u64, sums: &mu
                 if sums.effective.len() == index {
                     sums.effective.push((0.0, 0));
                 }
-                let share = report.effective_sample_size_before / next.count() as f64;
-                sums.effective[index].0 += share.min(1.0);
+                sums.effective[index].0 += report.effective_sample_size_before;
                 sums.effective[index].1 += 1;
                 particles = known_joints(next, joints_rad)?;
             }
-            Err(belief::Error::Depleted { .. }) => {
+            Err(belief::Error::Depleted { attempts, .. }) => {
                 sums.depleted += 1;
+                sums.updates += 1;
+                sums.transitions += attempts;
                 break;
             }
             Err(error) => return Err(error.into()),

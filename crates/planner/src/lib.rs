@@ -82,7 +82,9 @@
 //!   nodes, without hashing. The random generator takes 3 to 5 % of a search: its own buffer of four blocks is enough. A table of
 //!   1/√n in place of the root and the division in UCB1 changed the time by +2 and −3 %, and was left out.
 //! - **Bias.** The value of a root is the mean return of simulations that explore: below the optimum at any finite count. Decisions are
-//!   what the tests compare with exact values.
+//!   what the tests compare with exact values: for horizons 1 to 5 of Tiger, and for the infinite one that ends on opening, the
+//!   policy loses nothing. For horizons 10 and 20 UCT's root values stay below the optimum (6.6934 and 11.8796) by more than three
+//!   standard errors at any count that was tried (up to 2^22 simulations), because what lies below an opened door is visited as ln N.
 //!
 //! # Planted faults
 //!

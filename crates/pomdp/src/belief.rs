@@ -56,7 +56,8 @@ pub struct StructureReport {
     pub prior: f64,
     /// Its probability after the observation.
     pub posterior: f64,
-    /// Estimate of ln p(o | history, a, structure); −∞ where no particle of the structure explained it.
+    /// Estimate of ln p(o | history, a, structure); −∞ where no particle of the structure explained it. Only where the update reached
+    /// temperature 1: else the structures' shares are those of the tempered likelihood.
     pub log_evidence: f64,
     /// Particles of the structure in the new belief.
     pub particles: usize,

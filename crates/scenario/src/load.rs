@@ -84,7 +84,23 @@ impl Selection {
             .problem()
             .or_else(|| scenario.planner.validate().err().map(|e| e.to_string()))
             .or_else(|| scenario.belief.rejection.validate().err().map(|e| e.to_string()))
-            .or_else(|| scenario.belief.weighted.validate().err().map(|e| e.to_string()));
+            .or_else(|| scenario.belief.weighted.validate().err().map(|e| e.to_string()))
+            .or_else(|| {
+                // Else a restart late in an episode would be left out without a word.
+                let w = &scenario.belief.weighted;
+                let needed = w.history_limit * w.particles_min;
+                let short = w.restart_transitions > 0 && w.restart_transitions < needed;
+                short.then(|| {
+                    let found = w.restart_transitions;
+                    format!("belief.weighted.restart_transitions: expected 0 or history_limit × particles_min = {needed}, found {found}")
+                })
+            })
+            .or_else(|| {
+                let classes = scenario.planner.observations == planner::Observations::Classes;
+                (!classes).then(|| {
+                    "planner.observations: expected \"classes\", which is all that the agent searches with".into()
+                })
+            });
         match problem {
             Some(problem) => {
                 let key = problem.split(':').next().unwrap_or_default();

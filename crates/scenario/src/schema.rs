@@ -108,12 +108,12 @@ impl BeliefConfig {
         }
     }
 
-    /// Most transitions that an update simulates, restarts apart.
+    /// Most transitions that an update simulates, a restart included.
     #[must_use]
     pub fn transitions(&self) -> usize {
         match self.filter {
             Filter::Rejection => self.rejection.max_attempts,
-            Filter::Weighted => self.weighted.max_transitions,
+            Filter::Weighted => self.weighted.max_transitions + self.weighted.restart_transitions,
         }
     }
 }
