@@ -23,6 +23,8 @@ pub struct Task {
     pub seed: u64,
     /// With the budgets of `--quick`.
     pub quick: bool,
+    /// Scenario entries, key=value, for both presets.
+    pub set: Vec<String>,
 }
 
 /// What the arm did and saw.
@@ -92,7 +94,7 @@ pub fn run(root: &Path, task: &Task, mut note: impl FnMut(&str)) -> Result<Value
     }
     result.insert(
         "provenance".into(),
-        json!({ "domain": task.domain, "episodes": task.episodes, "seed": task.seed, "quick": task.quick,
+        json!({ "domain": task.domain, "episodes": task.episodes, "seed": task.seed, "quick": task.quick, "set": task.set,
                 "policy": "heuristic", "commit": scenario::commit(root) }),
     );
     Ok(Value::Object(result))

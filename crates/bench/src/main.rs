@@ -49,6 +49,9 @@ enum What {
         /// The small budgets of --quick runs.
         #[arg(long)]
         quick: bool,
+        /// Overrides a scenario entry of both presets: key=value.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
     },
     /// Speed, returns and exact values of the search on the standard problems.
     Planner {
@@ -98,9 +101,14 @@ fn run(arguments: &Arguments) -> Result<()> {
                 print!("{}", table(&result));
             }
         }
-        What::Belief { domain, episodes, seed, quick } => {
-            let task =
-                belief::Task { domain: domain.clone(), episodes: u64::from(*episodes), seed: *seed, quick: *quick };
+        What::Belief { domain, episodes, seed, quick, set } => {
+            let task = belief::Task {
+                domain: domain.clone(),
+                episodes: u64::from(*episodes),
+                seed: *seed,
+                quick: *quick,
+                set: set.clone(),
+            };
             let result = belief::run(&root, &task, |text| eprintln!("{text}"))?;
             println!("{}", serde_json::to_string_pretty(&result)?);
         }
