@@ -56,8 +56,13 @@ struct Sums {
 /// A scenario that does not load, or a world that contradicts it.
 pub fn run(root: &Path, task: &Task, mut note: impl FnMut(&str)) -> Result<Value> {
     let problem = |preset: &str| -> Result<Problem> {
-        let selection =
-            Selection { domain: task.domain.clone(), preset: preset.into(), quick: task.quick, ..Selection::new(root) };
+        let selection = Selection {
+            domain: task.domain.clone(),
+            preset: preset.into(),
+            quick: task.quick,
+            set: task.set.clone(),
+            ..Selection::new(root)
+        };
         Ok(Problem::assemble(&selection.load()?, root)?)
     };
     let problems = [problem(PRESETS[0])?, problem(PRESETS[1])?];
