@@ -5,7 +5,7 @@ use physics_model::{Action, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::Pomcp;
 use pomdp::{Discretise as _, Outcome, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
 use prior::Suggester;
-use scenario::{Filter, Problem, Tracker};
+use scenario::{Filter, Problem, Tracker, with_known_joints};
 
 use crate::{Episode, Error, Method, Reason, StepRecord, World};
 
@@ -117,7 +117,7 @@ impl<'a> Agent<'a> {
                             record.update = Some(report);
                             record.obstacle_share = Some(obstacle_share(&particles));
                             search.prune(&record.action, &model.key(&observation));
-                            Mind::Belief(search, with_joints(particles, &joints_rad)?, filter)
+                            Mind::Belief(search, with_known_joints(particles, &joints_rad)?, filter)
                         }
                         Err(belief::Error::Depleted { attempts, .. }) => {
                             depletions += 1;
@@ -248,16 +248,6 @@ fn suggest(prior: &Suggester, method: Method, context: &Context<'_>, count: usiz
     particles
 }
 
-/// The arm's own joint positions are known: particles whose simulated move ended elsewhere (stopped by a contact) take them over.
-fn with_joints(particles: Particles<Particle>, joints_rad: &[f64]) -> Result<Particles<Particle>, Error> {
-    let weights: Vec<f64> = particles.iter().map(|(_, weight)| weight).collect();
-    let mut states = particles.into_states();
-    for particle in &mut states {
-        particle.state.joints_rad.copy_from_slice(joints_rad);
-    }
-    Ok(Particles::weighted(states, weights)?)
-}
-
 fn obstacle_share(particles: &Particles<Particle>) -> f64 {
     let with = particles.iter().filter(|(particle, _)| particle.theta.obstacle.is_some());
     with.map(|(_, weight)| weight).sum()
@@ -368,7 +358,7 @@ mod tests {
         let (particles, _) =
             filter.update(&problem.model, particles, &action, &step.observation, Proposals::none(), &mut rng).unwrap();
         let shifted: Vec<f64> = step.joints_rad.iter().map(|q| q + 0.001).collect();
-        let particles = with_joints(particles, &shifted).unwrap();
+        let particles = with_known_joints(particles, &shifted).unwrap();
         assert!(particles.iter().all(|(p, _)| p.state.joints_rad == shifted));
         assert_ne!(joints, step.joints_rad);
     }

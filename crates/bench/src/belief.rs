@@ -6,7 +6,7 @@ use anyhow::Result;
 use belief::Particles;
 use physics_model::{Action, HeuristicPolicy, Observation, Particle};
 use pomdp::{Outcome, Policy as _, Proposals, Purpose, Seed};
-use scenario::{Problem, Selection};
+use scenario::{Problem, Selection, with_known_joints};
 use serde_json::{Map, Value, json};
 
 /// Presets that are compared.
@@ -143,7 +143,7 @@ fn track(problem: &Problem, record: &Record, seed: Seed, episode: u64, sums: &mu
                 }
                 sums.effective[index].0 += report.effective_sample_size_before;
                 sums.effective[index].1 += 1;
-                particles = known_joints(next, joints_rad)?;
+                particles = with_known_joints(next, joints_rad)?;
             }
             Err(belief::Error::Depleted { attempts, .. }) => {
                 sums.depleted += 1;
@@ -163,14 +163,4 @@ fn track(problem: &Problem, record: &Record, seed: Seed, episode: u64, sums: &mu
     let obstacle = mean(&|p| f64::from(u8::from(p.theta.obstacle.is_some())));
     sums.obstacle += (obstacle - f64::from(u8::from(truth.obstacle.is_some()))).powi(2);
     Ok(())
-}
-
-/// The arm's own joints are known.
-fn known_joints(particles: Particles<Particle>, joints_rad: &[f64]) -> Result<Particles<Particle>> {
-    let weights: Vec<f64> = particles.iter().map(|(_, weight)| weight).collect();
-    let mut states = particles.into_states();
-    for particle in &mut states {
-        particle.state.joints_rad.copy_from_slice(joints_rad);
-    }
-    Ok(Particles::weighted(states, weights)?)
 }

@@ -25,4 +25,4 @@ pub use schema::{
     AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,
     InitialObstacle, Published, Scenario, VERSION,
 };
-pub use tracker::Tracker;
+pub use tracker::{Tracker, with_known_joints};
