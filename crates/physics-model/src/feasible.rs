@@ -168,12 +168,7 @@ pub fn check_theta(theta: &Theta) -> Result<(), Impossible> {
     for size in &object.size_m[..object.shape.size_count()] {
         range("object size (m)", *size, 0.005, 1.0)?;
     }
-    for (axis, com) in object.com_m.iter().enumerate() {
-        let half = match (object.shape, axis) {
-            (ObjectShape::Box, _) => object.size_m[axis] / 2.0,
-            (ObjectShape::Cylinder, 2) => object.size_m[1] / 2.0,
-            _ => object.size_m[0],
-        };
+    for (com, half) in object.com_m.iter().zip(object.shape.half_extents_m(object.size_m)) {
         range("object centre of mass (m)", *com, -half, half)?;
     }
     if object.shape == ObjectShape::Cylinder {

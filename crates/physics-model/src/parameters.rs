@@ -43,7 +43,7 @@ impl StaticParameters for PushModel {
         match object.shape {
             ObjectShape::Sphere => values.push(logit(-object.com_m[2] / object.size_m[0])),
             shape => {
-                for (com, half) in object.com_m.iter().zip(half_extents_m(shape, object.size_m)) {
+                for (com, half) in object.com_m.iter().zip(shape.half_extents_m(object.size_m)) {
                     values.push(logit(0.5 * (1.0 + com / half)));
                 }
             }
@@ -75,7 +75,7 @@ impl StaticParameters for PushModel {
         match object.shape {
             ObjectShape::Sphere => object.com_m = [0.0, 0.0, -expit(values.next()?) * object.size_m[0]],
             shape => {
-                let half = half_extents_m(shape, object.size_m);
+                let half = shape.half_extents_m(object.size_m);
                 for (com, half) in object.com_m.iter_mut().zip(half) {
                     *com = (2.0 * expit(values.next()?) - 1.0) * half;
                 }
@@ -124,14 +124,6 @@ impl Partition for PushModel {
                 [bin(body.position_m[0]), bin(body.position_m[1])]
             }),
         }
-    }
-}
-
-fn half_extents_m(shape: ObjectShape, size_m: [f64; 3]) -> [f64; 3] {
-    match shape {
-        ObjectShape::Box => size_m.map(|size| size / 2.0),
-        ObjectShape::Cylinder => [size_m[0], size_m[0], size_m[1] / 2.0],
-        ObjectShape::Sphere => [size_m[0]; 3],
     }
 }
 

@@ -23,12 +23,8 @@ pub(crate) fn perturb(config: &PerturbConfig, table_height_m: f64, particle: &mu
     o.mass_kg = noisy_mass(o.mass_kg, config.mass_share, rng);
     o.friction = (o.friction + normal(config.friction, rng)).clamp(0.0, 1.0);
     noisy_sizes(o.shape, &mut o.size_m, config.size_m, rng);
-    for (axis, com) in o.com_m.iter_mut().enumerate() {
-        let half = match (o.shape, axis) {
-            (ObjectShape::Box, _) => o.size_m[axis] / 2.0,
-            (ObjectShape::Cylinder, 2) => o.size_m[1] / 2.0,
-            _ => o.size_m[0],
-        };
+    let half = o.shape.half_extents_m(o.size_m);
+    for (com, half) in o.com_m.iter_mut().zip(half) {
         *com = (*com + normal(config.com_m, rng)).clamp(-0.9 * half, 0.9 * half);
     }
     o.com_m = standard_com_m(o.shape, o.com_m);

@@ -44,6 +44,16 @@ impl ObjectShape {
         }
     }
 
+    /// Half extents, m, along the axes of the shape's frame.
+    #[must_use]
+    pub fn half_extents_m(self, size_m: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Box => size_m.map(|size| size / 2.0),
+            Self::Cylinder => [size_m[0], size_m[0], size_m[1] / 2.0],
+            Self::Sphere => [size_m[0]; 3],
+        }
+    }
+
     /// Radius, m, of the circle around the footprint of a shape of `size_m`.
     #[must_use]
     pub fn footprint_radius_m(self, size_m: [f64; 3]) -> f64 {

@@ -104,11 +104,7 @@ pub fn particle(draw: &Draw, joints: usize, table_height_m: f64) -> Particle {
     }
     let mut theta = Theta::from_parts(&values, [draw.classes[0], draw.classes[1]]);
     let object = &mut theta.object;
-    let half = match object.shape {
-        ObjectShape::Box => object.size_m.map(|s| s / 2.0),
-        ObjectShape::Cylinder => [object.size_m[0], object.size_m[0], object.size_m[1] / 2.0],
-        ObjectShape::Sphere => [object.size_m[0]; 3],
-    };
+    let half = object.shape.half_extents_m(object.size_m);
     for (com, half) in object.com_m.iter_mut().zip(half) {
         *com = com.clamp(-0.9 * half, 0.9 * half);
     }
