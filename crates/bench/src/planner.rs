@@ -8,7 +8,7 @@
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
-use planner::{ActionPriors, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth, SearchReport};
+use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth, SearchReport};
 use pomdp::{Belief, Discretise, Perturb, Policy, Purpose, Rng, Seed};
 use problems::bits::{Advice, Knowledge};
 use problems::tiger::{Action, Growls, OPTIMAL};
@@ -42,6 +42,7 @@ fn config(simulations: usize, exploration: f64) -> Config {
         rollout_depth: RolloutDepth::Full,
         action_priors: ActionPriors::Full,
         observations: Observations::Classes,
+        backup: Backup::Mean,
         nodes: 1 << 24,
         trees: 1,
         threads: 1,

@@ -1,4 +1,4 @@
-//! Settings of a search. Every key is required: a scenario states what it runs.
+//! Settings of a search. Every key but `backup` is required: a scenario states what it runs.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,10 @@ pub struct Config {
     pub action_priors: ActionPriors,
     /// How observations branch the tree.
     pub observations: Observations,
+    /// What an action learns from a simulation that explores below it. The mean where a file does not say, as files had no such key
+    /// before there was a choice.
+    #[serde(default)]
+    pub backup: Backup,
     /// Most nodes of all trees together, at least one a tree. States stored by progressive widening count as nodes. Once they are
     /// used up nothing is added any more: simulations turn into rollouts where they leave the tree, and
     /// [`crate::SearchReport::unexpanded`] counts them. Pruning frees nodes.
@@ -93,6 +97,20 @@ pub enum Observations {
         /// α_o in [0, 1].
         exponent: f64,
     },
+}
+
+/// What goes up from a node to the action that led there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Backup {
+    /// The return of the simulation, as published: V(ha) is the mean return of simulations that explore.
+    #[default]
+    Mean,
+    /// The return where the simulation took the best action known at the node, else the value of that action: a return is cut where the
+    /// simulation explored. This is Q(λ) of Watkins ("Learning from delayed rewards", 1989; Sutton and Barto 2018, section 12.10) with
+    /// λ = 1 and a step size of 1/N(ha). Khandelwal, Liebman, Niekum and Stone ("On the analysis of complex backup strategies in Monte
+    /// Carlo tree search", ICML 2016) compare such backups. For problems where one wrong action costs much more than right ones differ by.
+    Watkins,
 }
 
 impl Config {
@@ -184,6 +202,7 @@ mod tests {
             rollout_depth: RolloutDepth::Full,
             action_priors: ActionPriors::Off,
             observations: Observations::Classes,
+            backup: Backup::Mean,
             nodes: 1_000_000,
             trees: 1,
             threads: 1,
@@ -195,13 +214,14 @@ mod tests {
             .replace("{ transitions = 20000 }", "{ milliseconds = 50 }")
             .replace("\"off\"", "\"full\"")
             .replace("\"classes\"", "{ widening = { factor = 4.0, exponent = 0.3 } }");
-        let other: Config = toml::from_str(&other).unwrap();
+        let other: Config = toml::from_str(&format!("{other}\nbackup = \"watkins\"")).unwrap();
         let expected = Config {
             budget: Budget::Milliseconds(50),
             exploration: Exploration::Fixed(20.0),
             rollout_depth: RolloutDepth::Actions(4),
             action_priors: ActionPriors::Full,
             observations: Observations::Widening { factor: 4.0, exponent: 0.3 },
+            backup: Backup::Watkins,
             ..expected
         };
         assert_eq!(other, expected);

@@ -9,7 +9,7 @@ use crate::config::share;
 use crate::nodes::NodeId;
 use crate::rollout::rollout;
 use crate::ucb::{self, ReturnRange};
-use crate::{ActionPriors, Budget, Config};
+use crate::{ActionPriors, Backup, Budget, Config};
 
 /// What the simulations of one tree cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -153,12 +153,23 @@ where
         self.tally.simulations += 1;
         self.tally.transitions += self.path.len();
         self.tally.depth = self.tally.depth.max(self.path.len());
+        self.back_up(tail)
+    }
+
+    /// Records returns along the path, above a return of `below` at its end. Returns that of the root.
+    fn back_up(&mut self, mut below: f64) -> f64 {
         let discount = self.model.discount();
+        let mut discounted_return = below;
         for &(node, action, reward) in self.path.iter().rev() {
-            tail = reward + discount * tail;
-            self.tree.nodes_mut().slot_mut(node, action).record(tail);
+            discounted_return = reward + discount * below;
+            let nodes = self.tree.nodes_mut();
+            nodes.slot_mut(node, action).record(discounted_return);
+            below = match self.config.backup {
+                Backup::Mean => discounted_return,
+                Backup::Watkins => ucb::unless_exploring(nodes.slots(node), action, discounted_return),
+            };
         }
-        tail
+        discounted_return
     }
 
     fn set_priors(&mut self, node: NodeId, state: &M::State) {

@@ -94,6 +94,14 @@ pub(crate) fn select(slots: &[Slot], exploration: f64, rng: &mut Rng) -> usize {
     best
 }
 
+/// The return of a simulation that took `action`, which has it recorded already; the best value instead where another action has a
+/// better one than `action`.
+pub(crate) fn unless_exploring(slots: &[Slot], action: usize, discounted_return: f64) -> f64 {
+    let values = slots.iter().filter(|s| s.visits() > 0).map(|s| s.value);
+    let best = values.fold(f64::NEG_INFINITY, f64::max);
+    if slots[action].value < best { best } else { discounted_return }
+}
+
 /// Index of the action to execute: highest mean return, then more visits, then the lowest index. Unvisited actions are out.
 pub(crate) fn best(stats: &[ActionStats]) -> Option<usize> {
     let visited = stats.iter().enumerate().filter(|(_, s)| s.visits > 0);
@@ -174,6 +182,17 @@ mod tests {
         assert_eq!(select(&slots, 1.106, &mut rng()), 2);
         assert_eq!(slots[1].stats().visits, 0);
         assert_eq!(best(&[slots[1].stats(), slots[0].stats()]), Some(1));
+    }
+
+    #[test]
+    fn a_return_passes_where_the_action_is_the_best_and_the_best_value_passes_elsewhere() {
+        // Neither the value of an illegal action nor that of an unvisited one counts.
+        let slots = slots(&[(9, -2.0), (u32::MAX, 1e9), (1, -3.0), (0, 0.0), (4, -2.0)]);
+        assert_eq!(unless_exploring(&slots, 0, 7.0), 7.0);
+        assert_eq!(unless_exploring(&slots, 0, -90.0), -90.0);
+        assert_eq!(unless_exploring(&slots, 4, -90.0), -90.0, "one of two best actions");
+        assert_eq!(unless_exploring(&slots, 2, 7.0), -2.0);
+        assert_eq!(unless_exploring(&slots, 2, -90.0), -2.0);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Returns of whole episodes beside published ones, with preferred actions as POMCP 1.0 has them.
 
-use planner::{ActionPriors, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth};
+use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth};
 use pomdp::{Discretise, Perturb, Policy, Purpose, Seed};
 use problems::bits::Advice;
 use problems::{InitialState, RockSample, Tag, episode};
@@ -21,6 +21,7 @@ where
         rollout_depth: RolloutDepth::Full,
         action_priors: ActionPriors::Full,
         observations: Observations::Classes,
+        backup: Backup::Mean,
         nodes: 1 << 22,
         trees: 1,
         threads: 1,

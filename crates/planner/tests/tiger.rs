@@ -3,26 +3,32 @@
 //! The belief is the number k of growls from the left minus those from the right, so a policy can be evaluated exactly over all
 //! observations: the only randomness left is the planner's, and a loss is a wrong decision, not noise of the evaluation.
 
-use planner::{ActionPriors, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth};
-use pomdp::{Policy, Purpose, Rng, Seed, UniformPolicy};
-use problems::Tiger;
-use problems::tiger::{Action, Growls, OPTIMAL};
+use std::collections::BTreeMap;
 
-fn planner(factor: f64, simulations: usize, depth: usize) -> Pomcp<Tiger> {
-    let exploration = Exploration::ReturnRange(factor);
-    let budget = Budget::Simulations(simulations);
-    Pomcp::new(Config {
-        budget,
-        exploration,
+use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth};
+use pomdp::{GenerativeModel, Policy, Purpose, Rng, Seed, UniformPolicy, discounted_return};
+use problems::tiger::{Action, DISCOUNT, Growls, OPTIMAL, OPTIMAL_INFINITE};
+use problems::{InitialState, Tiger};
+
+const RESTARTING: Tiger = Tiger { ends_on_open: false };
+
+fn config(factor: f64, simulations: usize, depth: usize) -> Config {
+    Config {
+        budget: Budget::Simulations(simulations),
+        exploration: Exploration::ReturnRange(factor),
         depth,
         rollout_depth: RolloutDepth::Full,
         action_priors: ActionPriors::Off,
         observations: Observations::Classes,
+        backup: Backup::Mean,
         nodes: 1 << 24,
         trees: 1,
         threads: 1,
-    })
-    .unwrap()
+    }
+}
+
+fn planner(factor: f64, simulations: usize, depth: usize) -> Pomcp<Tiger> {
+    Pomcp::new(config(factor, simulations, depth)).unwrap()
 }
 
 /// With the restarting problem's wide rollouts (about 500 from best to worst) this factor decides rightly for every one of the
@@ -31,17 +37,17 @@ const FACTOR: f64 = 0.4;
 
 #[test]
 fn the_policy_of_fresh_searches_is_optimal_for_horizons_one_to_five() {
-    fn value(tiger: &Tiger, k: i32, remaining: usize) -> f64 {
+    fn value(k: i32, remaining: usize) -> f64 {
         if remaining == 0 {
             return 0.0;
         }
         let mut rng = Seed(1).stream(Purpose::Search, 0);
-        let report = planner(FACTOR, 1 << 16, remaining).search(tiger, &Growls(k), &UniformPolicy, remaining, &mut rng);
-        tiger.action_value(Growls(k), report.action, &mut |_, k| value(tiger, k, remaining - 1))
+        let report =
+            planner(FACTOR, 1 << 16, remaining).search(&RESTARTING, &Growls(k), &UniformPolicy, remaining, &mut rng);
+        RESTARTING.action_value(Growls(k), report.action, &mut |_, k| value(k, remaining - 1))
     }
-    let tiger = Tiger { ends_on_open: false };
     for (horizon, optimal) in OPTIMAL.into_iter().take(5) {
-        let value = value(&tiger, 0, horizon);
+        let value = value(0, horizon);
         // Published to four digits: the policy loses nothing.
         assert!((value - optimal).abs() < 5e-5, "horizon {horizon}: {value} instead of {optimal}");
     }
@@ -50,30 +56,29 @@ fn the_policy_of_fresh_searches_is_optimal_for_horizons_one_to_five() {
 #[test]
 fn the_policy_of_a_pruned_tree_is_optimal_for_horizons_one_to_five() {
     /// Action after a history of observations, by planning, acting and pruning all along it.
-    fn action(tiger: &Tiger, history: &[(bool, i32)], horizon: usize) -> Action {
+    fn action(history: &[(bool, i32)], horizon: usize) -> Action {
         let mut rng = Seed(1).stream(Purpose::Search, 0);
         let mut planner = planner(FACTOR, 1 << 16, horizon);
-        let mut report = planner.search(tiger, &Growls(0), &UniformPolicy, horizon, &mut rng);
+        let mut report = planner.search(&RESTARTING, &Growls(0), &UniformPolicy, horizon, &mut rng);
         for (step, (observation, k)) in (1..).zip(history) {
             planner.prune(&report.action, observation);
-            report = planner.search(tiger, &Growls(*k), &UniformPolicy, horizon - step, &mut rng);
+            report = planner.search(&RESTARTING, &Growls(*k), &UniformPolicy, horizon - step, &mut rng);
             assert!(report.reused > 1000, "{} visits kept after {history:?}", report.reused);
         }
         report.action
     }
-    fn value(tiger: &Tiger, history: &[(bool, i32)], horizon: usize) -> f64 {
+    fn value(history: &[(bool, i32)], horizon: usize) -> f64 {
         if history.len() == horizon {
             return 0.0;
         }
         let k = history.last().map_or(0, |&(_, k)| k);
-        let action = action(tiger, history, horizon);
-        tiger.action_value(Growls(k), action, &mut |observation, k| {
-            value(tiger, &[history, &[(observation, k)]].concat(), horizon)
+        let action = action(history, horizon);
+        RESTARTING.action_value(Growls(k), action, &mut |observation, k| {
+            value(&[history, &[(observation, k)]].concat(), horizon)
         })
     }
-    let tiger = Tiger { ends_on_open: false };
     for (horizon, optimal) in OPTIMAL.into_iter().take(5) {
-        let value = value(&tiger, &[], horizon);
+        let value = value(&[], horizon);
         assert!((value - optimal).abs() < 5e-5, "horizon {horizon}: {value} instead of {optimal}");
     }
 }
@@ -109,19 +114,17 @@ fn the_policy_ending_on_open_reaches_the_value_of_the_infinite_horizon() {
 /// returns span.
 #[test]
 fn root_values_rise_to_the_optimal_values() {
-    let tiger = Tiger { ends_on_open: false };
     for (horizon, optimal) in OPTIMAL.into_iter().take(5) {
         let loss_and_error = |simulations| {
             let value = |seed| {
                 let mut rng = Seed(seed).stream(Purpose::Search, 0);
                 let mut planner = planner(FACTOR, simulations, horizon);
-                let report = planner.search(&tiger, &Growls(0), &UniformPolicy, horizon, &mut rng);
+                let report = planner.search(&RESTARTING, &Growls(0), &UniformPolicy, horizon, &mut rng);
                 report.actions.iter().map(|a| a.value).fold(f64::NEG_INFINITY, f64::max)
             };
             let values: Vec<f64> = (1..=8).map(value).collect();
-            let mean = values.iter().sum::<f64>() / 8.0;
-            let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 7.0;
-            (optimal - mean, (variance / 8.0).sqrt())
+            let (mean, error) = mean_and_error(&values);
+            (optimal - mean, error)
         };
         let (early, _) = loss_and_error(1 << 14);
         let (late, error) = loss_and_error(1 << 18);
@@ -131,29 +134,121 @@ fn root_values_rise_to_the_optimal_values() {
     }
 }
 
-/// Horizons 10 and 20: the optimal policy opens at |k| = 2 for a gain of 1.1 in returns that span more than 1000, and UCB1 learns
-/// what lies below an opened door only as fast as ln N grows: 2^22 simulations do not suffice. What can be asked is that root
-/// values stay below the optimum (three standard errors of eight seeds) and rise.
+/// Beyond five actions the mean return of simulations that explore is of no use: below an opened door they are so few that one −100
+/// among them weighs more than all there is to gain. With the backup of Watkins and rollouts that cost little, seeds 101 to 104 all
+/// decide rightly with c = 90, 110 and 140, seeds 101 and 102 with factors 0.5, 0.8 and 1.0. Here the range of returns makes c about 115.
+fn far_sighted(backup: Backup, simulations: usize, depth: usize) -> Pomcp<Tiger> {
+    Pomcp::new(Config { backup, ..config(0.5, simulations, depth) }).unwrap()
+}
+
+/// Decisions of fresh searches ten actions ahead. One that would have more to go is the same search of the same seed, so it is made once.
+struct Decisions {
+    seed: u64,
+    made: BTreeMap<(usize, i32), Action>,
+}
+
+impl Decisions {
+    const DEPTH: usize = 10;
+
+    fn action(&mut self, remaining: usize, k: i32) -> Action {
+        let depth = remaining.min(Self::DEPTH);
+        *self.made.entry((depth, k)).or_insert_with(|| {
+            let mut rng = Seed(self.seed).stream(Purpose::Search, 0);
+            let mut planner = far_sighted(Backup::Watkins, 1 << 18, depth);
+            planner.search(&RESTARTING, &Growls(k), &Listens, depth, &mut rng).action
+        })
+    }
+
+    /// Exact value of following the decisions from an even belief.
+    fn value(&mut self, horizon: usize) -> f64 {
+        fn value(decisions: &mut Decisions, remaining: usize, k: i32, known: &mut BTreeMap<(usize, i32), f64>) -> f64 {
+            if remaining == 0 {
+                return 0.0;
+            }
+            if let Some(value) = known.get(&(remaining, k)) {
+                return *value;
+            }
+            let action = decisions.action(remaining, k);
+            let mut next = |_, k| value(decisions, remaining - 1, k, known);
+            let value = RESTARTING.action_value(Growls(k), action, &mut next);
+            known.insert((remaining, k), value);
+            value
+        }
+        value(self, horizon, 0, &mut BTreeMap::new())
+    }
+
+    /// Mean and standard error of the return of `episodes` played episodes.
+    fn played(&mut self, horizon: usize, episodes: u64) -> (f64, f64) {
+        let play = |item| {
+            let mut rng = Seed(self.seed).stream(Purpose::Truth, item);
+            let (mut left, mut k) = (RESTARTING.initial(&mut rng), 0);
+            let rewards = (0..horizon).map(|t| {
+                let action = self.action(horizon - t, k);
+                let step = RESTARTING.step(&mut left, &action, &mut rng);
+                k = match action {
+                    Action::Listen if step.observation => k + 1,
+                    Action::Listen => k - 1,
+                    Action::OpenLeft | Action::OpenRight => 0,
+                };
+                step.reward
+            });
+            discounted_return(rewards.collect::<Vec<f64>>(), DISCOUNT)
+        };
+        mean_and_error(&(0..episodes).map(play).collect::<Vec<f64>>())
+    }
+}
+
 #[test]
-fn root_values_of_long_horizons_stay_below_the_optimum_and_rise() {
-    let tiger = Tiger { ends_on_open: false };
+fn the_policy_of_long_horizons_is_optimal_with_returns_cut_where_simulations_explore() {
+    for seed in [1, 2] {
+        let mut decisions = Decisions { seed, made: BTreeMap::new() };
+        let long = OPTIMAL.into_iter().filter(|(horizon, _)| *horizon >= 10);
+        // 0.95^400 = 10⁻⁹: what follows is lost in the rounding.
+        for (horizon, optimal) in long.chain([(400, OPTIMAL_INFINITE)]) {
+            let value = decisions.value(horizon);
+            assert!((value - optimal).abs() < 5e-5, "seed {seed}, horizon {horizon}: {value} instead of {optimal}");
+            // The same by playing. Null: the mean of n = 10,000 episodes is optimal; tolerance three standard errors.
+            let (mean, error) = decisions.played(horizon, 10_000);
+            assert!(
+                (mean - optimal).abs() < 3.0 * error && error < 0.4,
+                "seed {seed}, horizon {horizon}: {mean} ± {error}"
+            );
+        }
+    }
+}
+
+/// Root values lag behind the decisions: the mean of returns remembers the time when less was known, and at 20 actions most histories
+/// are met once. Null: the mean of n = 8 seeds lies above V* by at most three standard errors, rises to it, and is nearer to it than
+/// the mean backup's by more than a factor of three.
+#[test]
+fn root_values_of_long_horizons_rise_towards_the_optimum() {
     for (horizon, optimal) in OPTIMAL.into_iter().filter(|(horizon, _)| *horizon >= 10) {
-        let mean_and_error = |simulations| {
+        let loss_and_error = |backup, simulations| {
             let value = |seed| {
                 let mut rng = Seed(seed).stream(Purpose::Search, 0);
-                let mut planner = planner(0.1, simulations, horizon);
-                let report = planner.search(&tiger, &Growls(0), &Listens, horizon, &mut rng);
+                let mut planner = far_sighted(backup, simulations, horizon);
+                let report = planner.search(&RESTARTING, &Growls(0), &Listens, horizon, &mut rng);
                 assert_eq!(report.action, Action::Listen);
                 report.actions[0].value
             };
-            let values: Vec<f64> = (1..=8).map(value).collect();
-            let mean = values.iter().sum::<f64>() / 8.0;
-            (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 56.0).sqrt())
+            let (mean, error) = mean_and_error(&(1..=8).map(value).collect::<Vec<f64>>());
+            (optimal - mean, error)
         };
-        let ((early, _), (late, error)) = (mean_and_error(1 << 12), mean_and_error(1 << 16));
-        assert!(late < optimal + 3.0 * error, "horizon {horizon}: {late} ± {error} above {optimal}");
-        assert!(late > early, "horizon {horizon}: {early} became {late}");
+        let (early, _) = loss_and_error(Backup::Watkins, 1 << 12);
+        let (late, error) = loss_and_error(Backup::Watkins, 1 << 16);
+        let (explored, _) = loss_and_error(Backup::Mean, 1 << 16);
+        assert!(late > -3.0 * error, "horizon {horizon}: {late} ± {error} above the optimum");
+        assert!(
+            late < early && 3.0 * late < explored,
+            "horizon {horizon}: loss {early} became {late}; {explored} by the mean"
+        );
     }
+}
+
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
 }
 
 /// Rollouts that cost little.

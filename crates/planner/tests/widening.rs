@@ -1,6 +1,6 @@
 //! Progressive widening against a problem with continuous observations whose values are known by quadrature.
 
-use planner::{ActionPriors, Budget, Config, Error, Exploration, Observations, Pomcp, Pomcpow, RolloutDepth};
+use planner::{ActionPriors, Backup, Budget, Config, Error, Exploration, Observations, Pomcp, Pomcpow, RolloutDepth};
 use pomdp::{Belief, GenerativeModel, ObservationModel, Outcome, Policy, Purpose, Rng, Seed, Step};
 use problems::LightDark;
 use problems::light_dark::Walk;
@@ -91,6 +91,7 @@ fn config(simulations: usize, depth: usize, factor: f64, exponent: f64) -> Confi
         rollout_depth: RolloutDepth::Full,
         action_priors: ActionPriors::Off,
         observations: Observations::Widening { factor, exponent },
+        backup: Backup::Mean,
         nodes: 1 << 24,
         trees: 1,
         threads: 1,

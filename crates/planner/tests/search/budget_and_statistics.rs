@@ -125,6 +125,63 @@ fn terminal_and_diverged_worlds_end_a_simulation_without_further_reward() {
 }
 
 #[test]
+fn a_return_is_cut_where_its_simulation_explored() {
+    // Two actions: 1 point for the first, then 0, or −100 for the actions 1 and 2. Each is tried after the rollout, so as long as only −100
+    // is known below, it passes; from the first 0 on nothing else does, however often the others are explored.
+    struct Costly;
+
+    impl GenerativeModel for Costly {
+        type State = usize;
+        type Action = usize;
+        type Observation = ();
+
+        fn actions(&self) -> &[usize] {
+            &[0, 1, 2]
+        }
+
+        fn step(&self, taken: &mut usize, action: &usize, _rng: &mut Rng) -> Step<()> {
+            *taken += 1;
+            let reward = if *taken == 1 { 1.0 } else { [0.0, -100.0, -100.0][*action] };
+            Step { observation: (), reward, outcome: Outcome::Continue }
+        }
+
+        fn discount(&self) -> f64 {
+            0.5
+        }
+    }
+    impl Discretise for Costly {
+        type Key = ();
+
+        fn key(&self, (): &()) {}
+    }
+    /// Rollouts that pay nothing.
+    struct First;
+    impl Policy<Costly> for First {
+        fn action(&self, _model: &Costly, _taken: &usize, _rng: &mut Rng) -> usize {
+            0
+        }
+    }
+    struct Start;
+    impl Belief for Start {
+        type State = usize;
+
+        fn sample(&self, _rng: &mut Rng) -> &usize {
+            &0
+        }
+    }
+    let losses = |backup| {
+        let exploration = Exploration::Fixed(100.0);
+        let config = Config { backup, exploration, ..config(Budget::Simulations(3000), 2) };
+        let report = Pomcp::new(config).unwrap().search(&Costly, &Start, &First, 2, &mut rng(0));
+        report.actions.iter().map(|a| (1.0 - a.value) * a.visits as f64 / 50.0).collect::<Vec<_>>()
+    };
+    // In returns of −100, discounted once: at most the two that came before the first 0.
+    let cut = losses(Backup::Watkins);
+    assert!(cut.iter().all(|&n| [0.0, 1.0, 2.0].iter().any(|m| (n - m).abs() < 1e-6)), "{cut:?}");
+    assert!(losses(Backup::Mean).iter().all(|&n| n > 10.0));
+}
+
+#[test]
 fn an_ending_inside_a_rollout_is_counted() {
     // Every world ends at its third step; the tree of one simulation is one step deep.
     for (ending, expected) in [(Outcome::Terminal, (1, 0)), (Outcome::Diverged, (0, 1))] {

@@ -7,7 +7,8 @@ use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use planner::{
-    ActionPriors, Budget, Config, Error, Exploration, ExportLimit, Observations, Pomcp, RolloutDepth, Stop, TreeNode,
+    ActionPriors, Backup, Budget, Config, Error, Exploration, ExportLimit, Observations, Pomcp, RolloutDepth, Stop,
+    TreeNode,
 };
 use pomdp::{
     ActionPrior, Belief, Discretise, GenerativeModel, Outcome, Policy, Purpose, Rng, Seed, Step, UniformPolicy,
@@ -123,6 +124,7 @@ fn config(budget: Budget, depth: usize) -> Config {
         rollout_depth: RolloutDepth::Full,
         action_priors: ActionPriors::Off,
         observations: Observations::Classes,
+        backup: Backup::Mean,
         nodes: 1 << 24,
         trees: 1,
         threads: 1,
