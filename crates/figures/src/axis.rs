@@ -5,6 +5,14 @@ use crate::panel::{Axis, Scale};
 /// Larger numbers count as not finite, so that differences stay finite.
 const LARGEST: f64 = 1e300;
 
+/// Smaller ones are zero, so that quotients stay finite too.
+pub(crate) const SMALLEST: f64 = 1e-290;
+
+/// Whether ticks between two numbers can differ: not where rounding is as large as their difference.
+pub(crate) fn distinct(low: f64, high: f64) -> bool {
+    high - low > (1e-9 * low.abs().max(high.abs())).max(SMALLEST)
+}
+
 /// Whether a number can be drawn.
 pub(crate) fn drawable(value: f64) -> bool {
     value.abs() < LARGEST
@@ -34,7 +42,7 @@ impl Ruler {
     pub(crate) fn around(axis: &Axis, values: impl Iterator<Item = f64>, margin: f64) -> Self {
         let log = axis.scale == Scale::Log;
         let (mut low, mut high, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, !log);
-        for value in values.filter(|v| drawable(*v) && (!log || *v > 0.0)) {
+        for value in values.filter(|v| drawable(*v) && (!log || *v > SMALLEST)) {
             low = low.min(value);
             high = high.max(value);
             whole &= value.fract() == 0.0;
@@ -49,13 +57,11 @@ impl Ruler {
         if log {
             let range = high.ln() - low.ln();
             let pad = if range > 1e-9 { range * margin } else { 0.5 }.exp();
-            return Self { low: (low / pad).max(f64::MIN_POSITIVE), high: (high * pad).min(LARGEST), ..base };
+            return Self { low: (low / pad).max(SMALLEST), high: (high * pad).min(LARGEST), ..base };
         }
         let range = high - low;
         let base = Self { whole: whole && range >= 3.0, ..base };
-        // Ticks need differences well above rounding.
-        let least = 1e-9 * low.abs().max(high.abs());
-        let pad = if range > least { range * margin } else { (0.05 * high.abs()).max(0.5) };
+        let pad = if distinct(low, high) { range * margin } else { (0.05 * high.abs()).max(0.5) };
         Self { low: low - pad, high: high + pad, ..base }
     }
 
@@ -76,7 +82,7 @@ impl Ruler {
         }
         let share = match self.scale {
             Scale::Linear => (value - self.low) / (self.high - self.low),
-            Scale::Log if value > 0.0 => (value.ln() - self.low.ln()) / (self.high.ln() - self.low.ln()),
+            Scale::Log if value >= SMALLEST => (value.ln() - self.low.ln()) / (self.high.ln() - self.low.ln()),
             Scale::Log => return None,
         };
         // Far outside is far enough: pixels stay small integers.
@@ -243,7 +249,8 @@ mod tests {
 
     #[test]
     fn every_range_gives_few_finite_ticks() {
-        let ends = [0.0, 1e-300, 1.0, 1.0 + 1e-15, 1e9, 1e9 + 1e-6, -1e299, 9.9e299, f64::NAN, f64::INFINITY];
+        let ends =
+            [0.0, 5e-324, 1e-300, 1e-289, 1.0, 1.0 + 1e-15, 1e9, 1e9 + 1e-6, -1e299, 9.9e299, f64::NAN, f64::INFINITY];
         for scale in [Scale::Linear, Scale::Log] {
             for a in ends {
                 for b in ends {

@@ -11,7 +11,7 @@ fn number() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => -10.0..10.0,
         1 => proptest::num::f64::ANY,
-        1 => prop::sample::select(vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::MAX, f64::MIN, f64::MIN_POSITIVE, 1e299, 5e-324]),
+        1 => prop::sample::select(vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::MAX, f64::MIN, f64::MIN_POSITIVE, 1e299, 8e-309, 5e-324]),
     ]
 }
 
@@ -78,7 +78,7 @@ fn chart() -> impl Strategy<Value = Chart> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 600, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn any_data_give_a_picture_or_a_typed_error(chart in chart()) {

@@ -162,9 +162,13 @@ fn the_bitmap_shows_what_the_svg_shows() {
 fn saving_writes_two_files_that_others_may_read_and_replaces_old_ones() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("a.b.png"), "old").unwrap();
+    // Who has the old file open keeps it whole: a second name for it stands for such a reader.
+    let reader = folder.path().join("reader");
+    std::fs::hard_link(folder.path().join("a.b.png"), &reader).unwrap();
     let figure = made_up::coverage();
     let paths = figure.save(&folder.path().join("a.b")).unwrap();
-    assert_eq!(names(folder.path()), ["a.b.png", "a.b.svg"]);
+    assert_eq!(std::fs::read_to_string(&reader).unwrap(), "old");
+    assert_eq!(names(folder.path()), ["a.b.png", "a.b.svg", "reader"]);
     assert_eq!(std::fs::read(&paths[0]).unwrap(), figure.svg().unwrap().as_bytes());
     assert_eq!(std::fs::read(&paths[1]).unwrap(), figure.png().unwrap());
     #[cfg(unix)]

@@ -1,7 +1,7 @@
 //! A table of colours.
 
 use super::{Plot, Sides, check_limits};
-use crate::axis::{Ruler, drawable, number};
+use crate::axis::{Ruler, distinct, drawable, number};
 use crate::frame::{Frame, Side, Sizes};
 use crate::legend::Entry;
 use crate::palette::{Color, FRAME, Palette, TEXT, WHITE, heat};
@@ -22,7 +22,7 @@ impl Heat {
             Ruler::around(&axis, values(), 0.0)
         } else {
             let highest = values().filter(|v| drawable(*v)).fold(0.0, f64::max);
-            let limits = self.limits.or((highest > 0.0).then_some((0.0, highest)));
+            let limits = self.limits.or(distinct(0.0, highest).then_some((0.0, highest)));
             Ruler::around(&Axis { limits, ..axis }, values(), 0.0)
         }
     }

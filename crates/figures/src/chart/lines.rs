@@ -1,7 +1,7 @@
 //! Values over a number.
 
 use super::{Plot, Sides, check_limits, check_references, clip, color_name, draw_reference, reference_entries};
-use crate::axis::Ruler;
+use crate::axis::{Ruler, SMALLEST};
 use crate::frame::{Frame, Side};
 use crate::legend::{DASHES, Entry, Swatch, marker};
 use crate::palette::{Look, Palette};
@@ -77,7 +77,7 @@ fn dashed(stroke: Stroke, look: Look) -> bool {
 /// The outlines of a series' band, one for each stretch without gaps.
 fn bands(series: &Series, frame: &Frame, plot: &Rect, scale: Scale) -> Vec<Vec<Point>> {
     // A logarithmic axis has no zero: what reaches it reaches the bottom.
-    let bottom = |low: f64| if scale == Scale::Log && low <= 0.0 { f64::MIN_POSITIVE } else { low };
+    let bottom = |low: f64| if scale == Scale::Log && low < SMALLEST { SMALLEST } else { low };
     let ends = |&(x, low, high): &(f64, f64, f64)| Some((frame.at(plot, x, bottom(low))?, frame.at(plot, x, high)?));
     let placed: Vec<Option<(Point, Point)>> = series.band.iter().map(ends).collect();
     let stretches = placed.split(Option::is_none).filter(|s| s.len() > 1);

@@ -6,7 +6,7 @@ mod heat;
 mod histogram;
 mod lines;
 
-use crate::axis::drawable;
+use crate::axis::{SMALLEST, distinct, drawable};
 use crate::frame::{Frame, Side, Sizes};
 use crate::legend::{BAND, DASHES, Entry, Swatch};
 use crate::palette::{Palette, REFERENCE, TEXT};
@@ -56,10 +56,11 @@ pub(crate) fn no_data(scene: &mut Scene, plot: &Rect, size: f64) {
 
 fn check_limits(axis: &Axis) -> Result<(), String> {
     match axis.limits {
-        Some((low, high)) if !(drawable(low) && drawable(high) && low < high) => {
-            Err(format!("limits of `{}` must be finite and ascend, not {low} to {high}", axis.label))
-        }
-        Some((low, _)) if axis.scale == Scale::Log && low <= 0.0 => {
+        Some((low, high)) if !(drawable(low) && drawable(high) && distinct(low, high)) => Err(format!(
+            "limits of `{}` must be finite, ascend and differ by more than rounding, not {low} to {high}",
+            axis.label
+        )),
+        Some((low, _)) if axis.scale == Scale::Log && low < SMALLEST => {
             Err(format!("limits of the logarithmic axis `{}` must be positive, not {low}", axis.label))
         }
         _ => Ok(()),
