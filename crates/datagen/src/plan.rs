@@ -17,6 +17,7 @@ pub fn schema(scenario: &Scenario) -> Schema {
         state: State::names(joints),
         theta: THETA_NAMES.map(String::from).to_vec(),
         classes: CLASS_TARGETS.map(|(name, _)| name.to_string()).to_vec(),
+        events: crate::generate::EVENTS.map(|(name, _)| name.to_string()).to_vec(),
     }
 }
 

@@ -48,6 +48,7 @@ fn rows(shard: u32) -> Vec<Row> {
                 state: state.clone(),
                 theta: theta.clone(),
                 classes: classes.clone(),
+                events: vec![u8::from(step > 3); 2],
             });
         }
     }
@@ -67,6 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             state: names("state", 33),
             theta: names("theta", 12),
             classes: names("class", 2),
+            events: names("event", 2),
         },
         scenario_hash: String::new(),
         config: serde_json::json!({}),

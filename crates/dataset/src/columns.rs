@@ -14,6 +14,7 @@ pub(crate) struct Columns {
     pub(crate) state: Vec<f64>,
     pub(crate) theta: Vec<f64>,
     pub(crate) classes: Vec<u8>,
+    pub(crate) events: Vec<u8>,
 }
 
 impl Columns {
@@ -38,6 +39,7 @@ impl Columns {
             columns.state.extend(&row.state);
             columns.theta.extend(&row.theta);
             columns.classes.extend(&row.classes);
+            columns.events.extend(&row.events);
         }
         Ok(columns)
     }
@@ -64,7 +66,7 @@ impl Columns {
 /// Column and reason if `row` does not fit the schema or its neighbours.
 fn check(schema: &Schema, row: &Row, previous: Option<&Row>, next: Option<&Row>) -> Result<(), (String, String)> {
     let fail = |column: &str, reason: String| Err((column.to_owned(), reason));
-    let lengths = [row.observation.len(), row.state.len(), row.theta.len(), row.classes.len()];
+    let lengths = [row.observation.len(), row.state.len(), row.theta.len(), row.classes.len(), row.events.len()];
     for ((column, names), found) in schema.lists().into_iter().zip(lengths) {
         if found != names.len() {
             return fail(column, format!("expected {} values, found {found}", names.len()));
@@ -76,6 +78,12 @@ fn check(schema: &Schema, row: &Row, previous: Option<&Row>, next: Option<&Row>)
     for (value, name) in values {
         if !value.is_finite() {
             return fail(name, format!("expected a finite value, found {value}"));
+        }
+    }
+    for (event, name) in row.events.iter().zip(&schema.events) {
+        if *event > u8::from(row.step > 0) {
+            let expected = if row.step > 0 { "0 or 1" } else { "0 before any action" };
+            return fail(name, format!("expected {expected}, found {event}"));
         }
     }
     if !row.reward.is_finite() {
@@ -130,6 +138,7 @@ mod tests {
             state: vec!["x_m".into()],
             theta: vec!["mass_kg".into()],
             classes: vec!["shape".into()],
+            events: vec!["tool_touched".into()],
         }
     }
 
@@ -144,6 +153,7 @@ mod tests {
             state: vec![2.0],
             theta: vec![0.0],
             classes: vec![1],
+            events: vec![u8::from(step == 2)],
         };
         vec![row(0, -1, 0), row(1, 9, 0), row(2, 0, 3)]
     }
@@ -159,9 +169,12 @@ mod tests {
     #[test]
     fn a_row_that_breaks_a_rule_is_refused_by_its_column() {
         type Case = (&'static str, usize, fn(&mut Row));
-        let broken: [Case; 12] = [
+        let broken: [Case; 15] = [
             ("observation", 0, |r| r.observation.push(0.0)),
             ("classes", 0, |r| r.classes.clear()),
+            ("events", 1, |r| r.events.clear()),
+            ("tool_touched", 0, |r| r.events[0] = 1),
+            ("tool_touched", 1, |r| r.events[0] = 2),
             ("torque_nm", 1, |r| r.observation[0] = f32::NAN),
             ("x_m", 1, |r| r.state[0] = f64::INFINITY),
             ("reward", 1, |r| r.reward = f32::NAN),

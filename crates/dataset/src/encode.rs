@@ -45,6 +45,7 @@ impl Header {
             ("surmise.state", list(&self.schema.state)),
             ("surmise.theta", list(&self.schema.theta)),
             ("surmise.classes", list(&self.schema.classes)),
+            ("surmise.events", list(&self.schema.events)),
             ("surmise.plan_hash", self.provenance.plan_hash.clone()),
             ("surmise.scenario_hash", self.provenance.scenario_hash.clone()),
             ("surmise.seed", self.provenance.seed.to_string()),
@@ -73,6 +74,7 @@ impl Header {
             state: list("surmise.state")?,
             theta: list("surmise.theta")?,
             classes: list("surmise.classes")?,
+            events: list("surmise.events")?,
         };
         let provenance = Provenance {
             plan_hash: text("surmise.plan_hash")?,
@@ -135,6 +137,7 @@ pub(crate) fn encode(header: &Header, columns: &Columns) -> Result<Vec<u8>, Parq
     vector!("state", Float64Type, columns.state, schema.state.len(), float);
     vector!("theta", Float64Type, columns.theta, schema.theta.len(), float);
     vector!("classes", UInt8Type, columns.classes, schema.classes.len(), integer);
+    vector!("events", UInt8Type, columns.events, schema.events.len(), integer);
 
     let arrow = Arc::new(arrow_schema::Schema::new(fields).with_metadata(header.to_metadata()));
     let batch = RecordBatch::try_new(arrow.clone(), arrays)?;
@@ -162,6 +165,7 @@ pub(crate) fn decode(bytes: Bytes) -> Result<(Header, Columns), String> {
         vector::<Float64Type>(&batch, "state", lists[1], &mut columns.state)?;
         vector::<Float64Type>(&batch, "theta", lists[2], &mut columns.theta)?;
         vector::<UInt8Type>(&batch, "classes", lists[3], &mut columns.classes)?;
+        vector::<UInt8Type>(&batch, "events", lists[4], &mut columns.events)?;
     }
     if columns.rows() as u64 != header.rows {
         return Err(format!("expected {} rows, found {}", header.rows, columns.rows()));
@@ -223,6 +227,7 @@ mod tests {
                 state: name("x_m"),
                 theta: name("mass_kg"),
                 classes: name("shape"),
+                events: name("tool_touched"),
             },
             provenance: Provenance {
                 plan_hash: "p".into(),
@@ -244,6 +249,7 @@ mod tests {
             state: vec![2.0],
             theta: vec![3.0],
             classes: vec![255],
+            events: vec![0],
         };
         let bytes = Bytes::from(encode(&header, &columns).unwrap());
         assert_eq!(decode(bytes.clone()).unwrap(), (header, columns));

@@ -32,6 +32,7 @@
 //!         state: vec!["object_x_m".into()],
 //!         theta: vec!["object_mass_kg".into()],
 //!         classes: vec!["object_shape".into()],
+//!         events: vec!["tool_touched".into()],
 //!     },
 //!     scenario_hash: "0f3a".into(),
 //!     config: serde_json::json!({"horizon": 30}),
@@ -45,7 +46,7 @@
 //!     if let ShardState::Missing = dataset::shard_state(dir, index, &plan.hash())? {
 //!         let first = Row {
 //!             episode: u64::from(index), step: 0, action: -1, reward: 0.0, outcome: 0,
-//!             observation: vec![0.1], state: vec![0.5], theta: vec![0.3], classes: vec![2],
+//!             observation: vec![0.1], state: vec![0.5], theta: vec![0.3], classes: vec![2], events: vec![0],
 //!         };
 //!         let last = Row { step: 1, action: 4, reward: 100.0, outcome: 1, ..first.clone() };
 //!         dataset::write_shard(dir, index, &plan.schema, &plan.provenance(), &Counts::new(), &[first, last])?;
@@ -77,4 +78,4 @@ pub use schema::{Counts, Provenance, Row, Schema};
 pub use shard::{ShardInfo, ShardState, shard_path, shard_state, write_shard};
 
 /// Version of the layout: of `plan.json`, of the shards and of the manifest.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;

@@ -36,6 +36,12 @@ pub struct Episode {
     pub theta: Vec<f64>,
     /// Discrete values of Θ, once.
     pub classes: Vec<u8>,
+    /// What happened in the action that led to a row: 0 or 1.
+    ///
+    /// # Shapes
+    ///
+    /// `[rows, schema.events]`, row-major.
+    pub events: Vec<u8>,
 }
 
 impl Episode {
@@ -186,6 +192,7 @@ fn split(columns: &Columns) -> Vec<Episode> {
                 state: columns.state[part(range, columns.state.len())].to_vec(),
                 theta: columns.theta[part(&first, columns.theta.len())].to_vec(),
                 classes: columns.classes[part(&first, columns.classes.len())].to_vec(),
+                events: columns.events[part(range, columns.events.len())].to_vec(),
             }
         })
         .collect()

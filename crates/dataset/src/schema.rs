@@ -25,6 +25,8 @@ pub struct Schema {
     pub theta: Vec<String>,
     /// Discrete values of Θ.
     pub classes: Vec<String>,
+    /// What a row says did happen (1) or did not (0) in the action that led there, such as `tool_touched`.
+    pub events: Vec<String>,
 }
 
 impl Schema {
@@ -49,8 +51,14 @@ impl Schema {
     }
 
     /// The vector columns with the names of their values, in file order.
-    pub(crate) fn lists(&self) -> [(&'static str, &[String]); 4] {
-        [("observation", &self.observation), ("state", &self.state), ("theta", &self.theta), ("classes", &self.classes)]
+    pub(crate) fn lists(&self) -> [(&'static str, &[String]); 5] {
+        [
+            ("observation", &self.observation),
+            ("state", &self.state),
+            ("theta", &self.theta),
+            ("classes", &self.classes),
+            ("events", &self.events),
+        ]
     }
 }
 
@@ -91,6 +99,8 @@ pub struct Row {
     pub theta: Vec<f64>,
     /// Discrete values of Θ; the same in all rows of an episode.
     pub classes: Vec<u8>,
+    /// 1 for what happened in the action that led here, else 0; all 0 in the first row.
+    pub events: Vec<u8>,
 }
 
 #[cfg(test)]
@@ -107,6 +117,7 @@ mod tests {
             state: names(&["a", "b"]),
             theta: vec![],
             classes: vec![],
+            events: vec![],
         };
         assert!(good.check().is_ok());
         let twice = Schema { state: names(&["a", "a"]), ..good.clone() }.check().unwrap_err().to_string();

@@ -38,6 +38,8 @@ pub enum Purpose {
     Statistics = 12,
     /// Tests.
     Test = 13,
+    /// Noise of the size of a training target's resolution.
+    Resolution = 14,
 }
 
 /// Root seed of a run.

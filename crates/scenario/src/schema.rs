@@ -152,7 +152,9 @@ pub struct DataConfig {
     pub movable_share: f64,
     /// Actions in an episode; fewer where the world diverges. Reaching the goal does not end it.
     pub episode_actions: usize,
-    /// Share of uniformly random actions.
+    /// Share of the episodes played by [`physics_model::GoalPolicy`], the others by the heuristic policy.
+    pub goal_share: f64,
+    /// Share of uniformly random actions in every episode.
     pub exploration_share: f64,
 }
 
@@ -335,6 +337,7 @@ impl Scenario {
             })
             .or_else(|| self.distribution.problem().map(|p| format!("distribution.{p}")))
             .or_else(|| check(share(d.movable_share), "data.movable_share", "0 to 1", &d.movable_share))
+            .or_else(|| check(share(d.goal_share), "data.goal_share", "0 to 1", &d.goal_share))
             .or_else(|| check(share(d.exploration_share), "data.exploration_share", "0 to 1", &d.exploration_share))
             .or_else(|| {
                 check(

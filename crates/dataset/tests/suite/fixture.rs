@@ -19,6 +19,7 @@ pub(crate) fn plan() -> Plan {
             state: names("state", 7),
             theta: names("theta", 3),
             classes: names("class", 2),
+            events: names("event", 2),
         },
         scenario_hash: "5ce0".into(),
         config: serde_json::json!({"horizon": 30, "noise": {"force_n": 0.1}}),
@@ -65,6 +66,7 @@ pub(crate) fn rows(plan: &Plan, index: u32) -> Vec<Row> {
                 state: f64s(1, 7, step),
                 theta: f64s(2, 3, 0),
                 classes: vec![(episode % 3) as u8, 3],
+                events: vec![u8::from(step > 0), u8::from(step > 2)],
             });
         }
     }

@@ -141,9 +141,9 @@ fn a_manifest_or_plan_of_the_future_or_with_an_unknown_key_says_so() {
         let message = read().to_string();
         assert!(message.contains(name) && message.contains("unknown field `sede`"), "{message}");
         // The version wins over keys that only the future knows.
-        edit(&path, "\"version\": 1", "\"version\": 2");
+        edit(&path, "\"version\": 2", "\"version\": 3");
         let error = read();
-        assert!(matches!(error, Error::Version { found: 2, .. }), "{error}");
+        assert!(matches!(error, Error::Version { found: 3, .. }), "{error}");
         assert!(error.to_string().contains(name) && error.source().is_none(), "{error}");
     }
 }

@@ -28,6 +28,7 @@ fn every_value_survives_a_write_and_a_read() {
             assert_eq!(f64s(&row.state), f64s(episode.state(i)));
             assert_eq!(f64s(&row.theta), f64s(&episode.theta));
             assert_eq!(row.classes, episode.classes);
+            assert_eq!(row.events, episode.events[2 * i..2 * (i + 1)]);
         }
     }
     assert!(expected.next().is_none());
@@ -40,6 +41,7 @@ fn rows_of_several_row_groups_and_empty_columns_survive() {
     let mut plan = Plan { shards: 2, episodes_per_shard: 3000, ..plan() };
     plan.schema.state.clear();
     plan.schema.classes.clear();
+    plan.schema.events.clear();
     plan.open(dir.path()).unwrap();
     let mut many = Vec::new();
     for episode in 0..2999 {
@@ -53,6 +55,7 @@ fn rows_of_several_row_groups_and_empty_columns_survive() {
             state: vec![],
             theta: vec![episode as f64; 3],
             classes: vec![],
+            events: vec![],
         }));
     }
     let info = dataset::write_shard(dir.path(), 0, &plan.schema, &plan.provenance(), &Counts::new(), &many).unwrap();
