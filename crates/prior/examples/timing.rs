@@ -5,7 +5,8 @@
 use pomdp::{Purpose, Rng, Seed};
 use prior::fused::{Batch, Workspace};
 use prior::{
-    ClassTarget, Dimensions, GradientPath, Inference, Layout, NetworkConfig, Parameters, Sequence, TrainConfig, Trainer,
+    ClassTarget, Dimensions, GradientPath, Inference, Layout, NetworkConfig, Parameters, Sequence, TrainConfig,
+    Trainer, Transform,
 };
 use rand::RngExt as _;
 use std::time::Instant;
@@ -23,7 +24,13 @@ fn layout() -> Layout {
     let names = |prefix: &str, count: usize| (0..count).map(|i| format!("{prefix}{i}")).collect::<Vec<_>>();
     let classes = [("shape", 3), ("obstacle", 4)];
     let classes = classes.map(|(name, count)| ClassTarget { name: name.into(), labels: names("label", count) });
-    Layout { robot: "sawyer".into(), observation: names("o", 20), continuous: names("y", 45), classes: classes.into() }
+    Layout {
+        robot: "sawyer".into(),
+        observation: names("o", 20),
+        continuous: names("y", 45),
+        transforms: vec![Transform::Identity; 45],
+        classes: classes.into(),
+    }
 }
 
 fn episode(rng: &mut Rng) -> Sequence {
@@ -46,7 +53,7 @@ fn main() {
     let mut rng = Seed(1).stream(Purpose::Test, 0);
     // One held-out episode or so: an epoch is BATCHES steps and hardly anything else.
     let data: Vec<Sequence> = (0..BATCH * BATCHES).map(|_| episode(&mut rng)).collect();
-    let network = NetworkConfig { hidden: vec![128, 128], components: 10 };
+    let network = NetworkConfig { hidden: vec![128, 128], components: 10, memory: true };
     for (gradient, threads, chunks) in [
         (GradientPath::Fused, 1, 1),
         (GradientPath::Fused, 1, 2),
@@ -57,6 +64,7 @@ fn main() {
         let config = TrainConfig {
             network: network.clone(),
             learning_rate: 1e-3,
+            schedule: prior::Schedule::Constant,
             batch: BATCH,
             chunks,
             held_out: 0.004,
@@ -65,6 +73,7 @@ fn main() {
             clip_norm: None,
             weight_decay: 0.0,
             dropout: 0.0,
+            rescale: false,
             gradient,
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a thread pool");

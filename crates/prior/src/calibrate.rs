@@ -1,282 +1,290 @@
 //! Whether what the prior suggests on held-out episodes happens as often as it says.
 
-use crate::fused::{HALF_LOG_TAU, LOG_STDDEV_LIMITS};
-use crate::inference::Inference;
-use crate::mixture::largest;
-use crate::normalise::{Normalisation, Scale};
-use crate::{Layout, Sequence};
+mod baseline;
+mod report;
+
+use std::ops::Range;
+
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+
+pub use baseline::Baseline;
+pub use report::{Calibration, ClassReport, Likelihoods, ParameterReport, Score, StepReport};
+
+use crate::inference::Inference;
+use crate::mixture::{Mixture, largest};
+use crate::normalise::Scale;
+use crate::{Layout, Sequence};
 
 /// Bins of a rank histogram, and of the expected calibration error.
 const BINS: usize = 20;
 
-/// Independent marginals of the training data: what is known without any observation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Baseline {
-    /// Gaussian of each continuous target, where it applies.
-    pub continuous: Vec<Scale>,
-    /// Frequency of each label of each class target.
-    pub classes: Vec<Vec<f64>>,
-}
-
-impl Baseline {
-    /// Marginals of `sequences`; the spread of a constant has the same floor as the network's, frequencies start from one
-    /// count a label.
-    #[must_use]
-    pub fn fit(layout: &Layout, normalisation: &Normalisation, sequences: &[&Sequence]) -> Self {
-        let (width, kinds) = (layout.continuous.len(), layout.classes.len());
-        let continuous = normalisation.continuous.iter().enumerate().map(|(column, scale)| {
-            let rows = sequences.iter().flat_map(|s| s.targets.iter().zip(&s.mask).skip(column).step_by(width));
-            let squares = rows.filter(|(_, mask)| **mask == 1.0).map(|(&v, _)| (f64::from(v) - scale.mean).powi(2));
-            let (sum, count) = squares.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
-            let stddev = if count > 0.0 { f64::sqrt(sum / count) } else { scale.stddev };
-            Scale { mean: scale.mean, stddev: stddev.max(scale.stddev * LOG_STDDEV_LIMITS.0.exp()) }
-        });
-        let classes = layout.classes.iter().enumerate().map(|(kind, target)| {
-            let mut counts = vec![1.0; target.labels.len()];
-            for &label in sequences.iter().flat_map(|s| s.classes.iter().skip(kind).step_by(kinds)) {
-                counts[usize::from(label)] += 1.0;
-            }
-            let total: f64 = counts.iter().sum();
-            counts.iter().map(|count| count / total).collect()
-        });
-        Self { continuous: continuous.collect(), classes: classes.collect() }
-    }
-
-    /// ln p(values, classes) under the marginals; values whose mask is false do not count.
-    #[must_use]
-    pub fn log_density(&self, values: &[f64], mask: &[bool], classes: &[usize]) -> f64 {
-        let gaussians = values.iter().zip(mask).zip(&self.continuous).filter(|((_, applies), _)| **applies);
-        let gaussians = gaussians.map(|((value, _), scale)| {
-            let standard = (value - scale.mean) / scale.stddev;
-            -0.5 * standard * standard - scale.stddev.ln() - HALF_LOG_TAU
-        });
-        let labels = classes.iter().zip(&self.classes).map(|(&class, frequencies)| frequencies[class].ln());
-        gaussians.sum::<f64>() + labels.sum::<f64>()
-    }
-}
-
-/// A held-out episode, in original units.
+/// A held-out episode.
 #[derive(Clone, Copy, Debug)]
 pub struct Episode<'a> {
     /// Observations and truth.
     pub sequence: &'a Sequence,
-    /// First step whose observation follows a contact; none if there was none.
+    /// First step whose observation follows a contact of the tool; none if there was none.
     pub contact: Option<usize>,
+    /// Whether the tool or the object touched the obstacle.
+    pub obstacle_touched: bool,
 }
 
-/// Means over a set of time steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Score {
-    /// Time steps.
-    pub count: usize,
-    /// Negative log-likelihood, nats a step in original units.
-    pub nll: f64,
-    /// The same of the baseline.
-    pub baseline_nll: f64,
-}
-
-/// Scores at one step of the episode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StepReport {
-    /// Step in the episode, from 0.
-    pub step: usize,
-    /// All episodes that last so long.
-    pub all: Score,
-    /// Those with a contact up to this step.
-    pub after_contact: Score,
-}
-
-/// Calibration of one continuous target.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ParameterReport {
-    /// Name in the layout.
-    pub name: String,
-    /// Time steps at which it applies.
-    pub count: usize,
-    /// Share of them with the truth inside the central 50 % interval of the marginal.
-    pub coverage50: f64,
-    /// Share of them with the truth inside the central 90 % interval of the marginal.
-    pub coverage90: f64,
-    /// Histogram of P(target ≤ truth), flat if calibrated.
-    pub ranks: Vec<usize>,
-}
-
-/// Accuracy of one class target.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ClassReport {
-    /// Name in the layout.
-    pub name: String,
-    /// Its labels.
-    pub labels: Vec<String>,
-    /// Share of all time steps at which the likeliest label is the true one.
-    pub accuracy: f64,
-    /// The same at the last step of each episode.
-    pub last_accuracy: f64,
-    /// Mean distance between stated confidence and accuracy over equal bins of confidence, weighted by count.
-    pub expected_calibration_error: f64,
-    /// Time steps by true label (row) and likeliest label (column).
-    pub confusion: Vec<Vec<usize>>,
-}
-
-/// The calibration report of a prior.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Calibration {
-    /// Held-out episodes.
-    pub episodes: usize,
-    /// Negative log-likelihood, nats a step in original units.
-    pub nll: f64,
-    /// The same of the marginals of the training data.
-    pub baseline_nll: f64,
-    /// One per continuous target.
-    pub parameters: Vec<ParameterReport>,
-    /// Accuracy of the first class target at the last step of each episode.
-    pub shape_accuracy: Option<f64>,
-    /// Of the first class target with a label `none`: share of the episodes with a contact in which, at the last step, "none
-    /// or something" is right.
-    pub obstacle_after_contact_accuracy: Option<f64>,
-    /// One per class target.
-    pub classes: Vec<ClassReport>,
-    /// One per step of the longest episode.
-    pub sharpening: Vec<StepReport>,
+/// What is compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Models<'a> {
+    /// The network.
+    pub network: &'a Inference,
+    /// The sampling distribution.
+    pub baseline: &'a Baseline,
+    /// The same network trained without memory.
+    pub memoryless: Option<&'a Inference>,
 }
 
 /// What one time step contributes.
 struct Record {
-    nll: f64,
-    baseline_nll: f64,
+    nll: Likelihoods,
+    static_nll: Likelihoods,
     /// P(target ≤ truth) where it applies.
     ranks: Vec<Option<f64>>,
-    /// True label, likeliest label and its probability, and P(none) of each class target.
-    classes: Vec<(usize, usize, f64)>,
+    /// Of each static target, where it applies.
+    spread: Vec<Option<f64>>,
+    /// True label, likeliest label and its probability, and probability of the true one, of each class target.
+    classes: Vec<(usize, usize, f64, f64)>,
     none: f64,
 }
 
-/// Runs `inference` over every episode and compares with the truth.
+/// Runs the models over every episode and compares with the truth; `static_columns` are the continuous targets that stay the same
+/// in an episode.
 ///
-/// The rank of a target that does not always apply (the size of an obstacle that may be absent) is taken given the true
-/// classes, because components without it say nothing about its value; all other ranks are unconditional.
+/// The rank of a target that does not always apply (the size of an obstacle that may be absent) is taken given that it applies: that
+/// each class has a label with which it was seen to apply. Components without it say nothing of its value.
 #[must_use]
-pub fn calibrate(inference: &Inference, layout: &Layout, baseline: &Baseline, episodes: &[Episode<'_>]) -> Calibration {
+pub fn calibrate(
+    models: Models<'_>,
+    layout: &Layout,
+    static_columns: Range<usize>,
+    episodes: &[Episode<'_>],
+) -> Calibration {
     let width = layout.continuous.len();
-    let always: Vec<bool> = (0..width)
-        .map(|column| episodes.iter().all(|e| e.sequence.mask.iter().skip(column).step_by(width).all(|&m| m == 1.0)))
-        .collect();
+    let targets: Vec<Target> = (0..width).map(|column| Target::of(column, layout, episodes)).collect();
     let none =
         layout.classes.iter().enumerate().find_map(|(target, class)| {
             class.labels.iter().position(|label| label == "none").map(|label| (target, label))
         });
-    let runs: Vec<Vec<Record>> =
-        episodes.par_iter().map(|episode| run(inference, baseline, episode.sequence, &always, none)).collect();
-    let score = |records: &mut dyn Iterator<Item = &Record>| {
-        let (mut count, mut nll, mut baseline_nll) = (0, 0.0, 0.0);
-        for record in records {
-            (count, nll, baseline_nll) = (count + 1, nll + record.nll, baseline_nll + record.baseline_nll);
-        }
-        let divisor = (count as f64).max(1.0);
-        Score { count, nll: nll / divisor, baseline_nll: baseline_nll / divisor }
-    };
-    let total = score(&mut runs.iter().flatten());
-    let longest = runs.iter().map(Vec::len).max().unwrap_or(0);
-    let sharpening = (0..longest).map(|step| {
-        let touched = runs.iter().zip(episodes).filter(|(_, episode)| episode.contact.is_some_and(|at| at <= step));
-        StepReport {
-            step,
-            all: score(&mut runs.iter().filter_map(|records| records.get(step))),
-            after_contact: score(&mut touched.filter_map(|(records, _)| records.get(step))),
-        }
-    });
-    let obstacle_after_contact_accuracy = none.and_then(|(target, label)| {
-        let touched = runs.iter().zip(episodes).filter(|(_, episode)| episode.contact.is_some());
-        let right = touched.filter_map(|(records, _)| records.last()).map(|last| {
-            let absent = last.classes[target].0 == label;
-            f64::from(u8::from((last.none > 0.5) == absent))
-        });
-        mean(right)
-    });
+    let what = What { models, targets: &targets, none, static_columns: static_columns.clone() };
+    let runs: Vec<Vec<Record>> = episodes.par_iter().map(|episode| what.run(episode.sequence)).collect();
+    let total = score(runs.iter().flatten());
+    let obstacles = obstacles(&runs, episodes, none);
     let classes: Vec<ClassReport> = (0..layout.classes.len()).map(|target| classify(layout, &runs, target)).collect();
     Calibration {
         episodes: episodes.len(),
-        nll: total.nll,
-        baseline_nll: total.baseline_nll,
+        steps: total.count,
+        nll: total.nll.network,
+        baseline_nll: total.nll.baseline,
+        memoryless_nll: total.nll.memoryless,
         parameters: (0..width).map(|target| rank(layout, &runs, target)).collect(),
+        static_targets: layout.continuous[static_columns].to_vec(),
         shape_accuracy: classes.first().map(|report| report.last_accuracy),
-        obstacle_after_contact_accuracy,
+        obstacle_after_contact_accuracy: obstacles.found,
+        obstacle_contact_episodes: obstacles.touched,
+        no_obstacle_accuracy: obstacles.denied,
         classes,
-        sharpening: sharpening.collect(),
+        sharpening: sharpening(&runs, episodes),
     }
 }
 
-fn run(
-    inference: &Inference,
-    baseline: &Baseline,
-    sequence: &Sequence,
-    always: &[bool],
+/// Of one continuous target.
+struct Target {
+    /// Labels of each class target with which it applies, `[class targets][labels]`.
+    labels: Vec<Vec<bool>>,
+    /// Standard deviation of the truth where it applies.
+    stddev: f64,
+}
+
+impl Target {
+    fn of(column: usize, layout: &Layout, episodes: &[Episode<'_>]) -> Self {
+        let (width, kinds) = (layout.continuous.len(), layout.classes.len());
+        let mut labels: Vec<Vec<bool>> = layout.classes.iter().map(|target| vec![false; target.labels.len()]).collect();
+        let mut values = Vec::new();
+        for sequence in episodes.iter().map(|episode| episode.sequence) {
+            let rows = sequence.mask.iter().zip(&sequence.targets).skip(column).step_by(width).enumerate();
+            for (row, (_, value)) in rows.filter(|(_, (mask, _))| **mask == 1.0) {
+                values.push(f64::from(*value));
+                for (labels, &class) in labels.iter_mut().zip(&sequence.classes[row * kinds..]) {
+                    labels[usize::from(class)] = true;
+                }
+            }
+        }
+        Self { labels, stddev: Scale::fit(values.into_iter()).stddev }
+    }
+}
+
+struct What<'a> {
+    models: Models<'a>,
+    targets: &'a [Target],
     none: Option<(usize, usize)>,
-) -> Vec<Record> {
-    let mut inference = inference.clone();
-    inference.reset();
-    let (width, kinds) = (always.len(), baseline.classes.len());
-    let inputs = sequence.observations.len() / sequence.steps.max(1);
-    let step = |step: usize| {
-        let wide = |values: &[f32], width: usize| -> Vec<f64> {
-            values[step * width..(step + 1) * width].iter().map(|&value| f64::from(value)).collect()
+    static_columns: Range<usize>,
+}
+
+impl What<'_> {
+    fn run(&self, sequence: &Sequence) -> Vec<Record> {
+        let afresh = |inference: &Inference| {
+            let mut inference = inference.clone();
+            inference.reset();
+            inference
         };
-        let mixture = inference.step(&wide(&sequence.observations, inputs));
-        let values = wide(&sequence.targets, width);
-        let mask: Vec<bool> = wide(&sequence.mask, width).iter().map(|&mask| mask == 1.0).collect();
-        let truth: Vec<usize> =
-            sequence.classes[step * kinds..(step + 1) * kinds].iter().map(|&class| usize::from(class)).collect();
+        let mut network = afresh(self.models.network);
+        let mut memoryless = self.models.memoryless.map(afresh);
+        let inputs = sequence.observations.len() / sequence.steps.max(1);
+        let step = |step: usize| {
+            let observation = wide(&sequence.observations, step, inputs);
+            let memoryless = memoryless.as_mut().map(|memoryless| memoryless.step(&observation));
+            self.record(network.step(&observation), memoryless, sequence, step)
+        };
+        (0..sequence.steps).map(step).collect()
+    }
+
+    fn record(&self, mixture: &Mixture, memoryless: Option<&Mixture>, sequence: &Sequence, step: usize) -> Record {
+        let baseline = self.models.baseline;
+        let (width, kinds) = (self.targets.len(), baseline.labels.len());
+        let values = wide(&sequence.targets, step, width);
+        let mask: Vec<bool> = wide(&sequence.mask, step, width).iter().map(|&mask| mask == 1.0).collect();
+        let labels = &sequence.classes[step * kinds..(step + 1) * kinds];
+        let truth: Vec<usize> = labels.iter().map(|&class| usize::from(class)).collect();
         let ranks = (0..width).map(|target| {
-            let given = if always[target] { None } else { Some(truth.as_slice()) };
-            mask[target].then(|| mixture.cumulative(target, values[target], given))
+            mask[target].then(|| mixture.cumulative(target, values[target], &self.targets[target].labels))
         });
         let classes = truth.iter().enumerate().map(|(target, &truth)| {
             let probabilities = mixture.class_probabilities(target);
             let likeliest = largest(&probabilities);
-            (truth, likeliest, probabilities[likeliest])
+            (truth, likeliest, probabilities[likeliest], probabilities[truth])
         });
+        let spread = self.static_columns.clone().map(|target| (&self.targets[target], mask[target], target)).map(
+            |(Target { labels, stddev }, applies, target)| applies.then(|| mixture.stddev(target, labels) / stddev),
+        );
+        let likelihoods = |mask: &[bool]| Likelihoods {
+            network: -mixture.log_density_masked(&values, mask, &truth),
+            baseline: -baseline.log_density(&values, mask, labels),
+            memoryless: memoryless.map(|memoryless| -memoryless.log_density_masked(&values, mask, &truth)),
+        };
+        let statics: Vec<bool> = mask.iter().enumerate().map(|(i, &m)| m && self.static_columns.contains(&i)).collect();
         Record {
-            nll: -mixture.log_density_masked(&values, &mask, &truth),
-            baseline_nll: -baseline.log_density(&values, &mask, &truth),
+            nll: likelihoods(&mask),
+            static_nll: likelihoods(&statics),
             ranks: ranks.collect(),
+            spread: spread.collect(),
             classes: classes.collect(),
-            none: none.map_or(0.0, |(target, label)| mixture.class_probabilities(target)[label]),
+            none: self.none.map_or(0.0, |(target, label)| mixture.class_probabilities(target)[label]),
+        }
+    }
+}
+
+fn wide(values: &[f32], step: usize, width: usize) -> Vec<f64> {
+    values[step * width..(step + 1) * width].iter().map(|&value| f64::from(value)).collect()
+}
+
+fn score<'a>(records: impl Iterator<Item = &'a Record>) -> Score {
+    let records: Vec<&Record> = records.collect();
+    let average = |of: &dyn Fn(&Record) -> Option<f64>| mean(records.iter().filter_map(|record| of(record)));
+    let likelihoods = |of: &dyn Fn(&Record) -> Likelihoods| Likelihoods {
+        network: average(&|record| Some(of(record).network)).unwrap_or(0.0),
+        baseline: average(&|record| Some(of(record).baseline)).unwrap_or(0.0),
+        memoryless: average(&|record| of(record).memoryless),
+    };
+    let (statics, kinds) = records.first().map_or((0, 0), |first| (first.spread.len(), first.classes.len()));
+    Score {
+        count: records.len(),
+        nll: likelihoods(&|record| record.nll),
+        static_nll: likelihoods(&|record| record.static_nll),
+        spread: (0..statics).map(|i| average(&|record| record.spread[i]).unwrap_or(0.0)).collect(),
+        class_probability: (0..kinds).map(|i| average(&|record| Some(record.classes[i].3)).unwrap_or(0.0)).collect(),
+    }
+}
+
+fn sharpening(runs: &[Vec<Record>], episodes: &[Episode<'_>]) -> Vec<StepReport> {
+    let longest = runs.iter().map(Vec::len).max().unwrap_or(0);
+    let report = |step: usize| {
+        let part = |wanted: bool| {
+            let touched = |episode: &Episode<'_>| episode.contact.is_some_and(|at| at <= step);
+            let chosen = runs.iter().zip(episodes).filter(move |(_, episode)| touched(episode) == wanted);
+            score(chosen.filter_map(|(records, _)| records.get(step)))
+        };
+        let since = runs.iter().zip(episodes);
+        StepReport {
+            step,
+            all: score(runs.iter().filter_map(|records| records.get(step))),
+            after_contact: part(true),
+            before_contact: part(false),
+            since_contact: score(since.filter_map(|(records, episode)| records.get(episode.contact? + step))),
         }
     };
-    (0..sequence.steps).map(step).collect()
+    (0..longest).map(report).collect()
+}
+
+struct Obstacles {
+    found: Option<f64>,
+    touched: usize,
+    denied: Option<f64>,
+}
+
+fn obstacles(runs: &[Vec<Record>], episodes: &[Episode<'_>], none: Option<(usize, usize)>) -> Obstacles {
+    let ends = || runs.iter().zip(episodes).filter_map(|(records, episode)| Some((records.last()?, episode)));
+    let touched = || ends().filter(|(_, episode)| episode.obstacle_touched);
+    let absent = ends().filter(|(last, _)| none.is_some_and(|(target, label)| last.classes[target].0 == label));
+    let share = |right: bool| f64::from(u8::from(right));
+    Obstacles {
+        found: none.and_then(|_| mean(touched().map(|(last, _)| share(last.none < 0.5)))),
+        touched: none.map_or(0, |_| touched().count()),
+        denied: mean(absent.map(|(last, _)| share(last.none > 0.5))),
+    }
 }
 
 /// Coverage and histogram of one continuous target.
 fn rank(layout: &Layout, runs: &[Vec<Record>], target: usize) -> ParameterReport {
     let mut ranks = vec![0; BINS];
-    let (mut count, mut inside50, mut inside90) = (0, 0, 0);
-    for rank in runs.iter().flatten().filter_map(|record| record.ranks[target]) {
-        count += 1;
-        inside50 += usize::from((rank - 0.5).abs() <= 0.25);
-        inside90 += usize::from((rank - 0.5).abs() <= 0.45);
-        ranks[((rank * BINS as f64) as usize).min(BINS - 1)] += 1;
+    let (mut count, mut inside50, mut inside90) = (0, 0, 0_usize);
+    // Steps and steps inside the 90 % interval of each episode.
+    let mut episodes = Vec::new();
+    for records in runs {
+        let (mut steps, mut inside) = (0, 0);
+        for rank in records.iter().filter_map(|record| record.ranks[target]) {
+            steps += 1;
+            inside50 += usize::from((rank - 0.5).abs() <= 0.25);
+            inside += usize::from((rank - 0.5).abs() <= 0.45);
+            ranks[((rank * BINS as f64) as usize).min(BINS - 1)] += 1;
+        }
+        if steps > 0 {
+            (count, inside90) = (count + steps, inside90 + inside);
+            episodes.push((steps as f64, inside as f64));
+        }
     }
     let share = |inside: usize| inside as f64 / (count as f64).max(1.0);
-    let name = layout.continuous[target].clone();
-    ParameterReport { name, count, coverage50: share(inside50), coverage90: share(inside90), ranks }
+    let coverage90 = share(inside90);
+    // Of a ratio of sums over independent episodes (Cochran 1977, section 6.3).
+    let squares: f64 = episodes.iter().map(|(steps, inside)| (inside - coverage90 * steps).powi(2)).sum();
+    ParameterReport {
+        name: layout.continuous[target].clone(),
+        count,
+        episodes: episodes.len(),
+        coverage50: share(inside50),
+        coverage90,
+        coverage90_stderr: squares.sqrt() / (count as f64).max(1.0),
+        ranks,
+    }
 }
 
 /// Accuracy of one class target.
 fn classify(layout: &Layout, runs: &[Vec<Record>], target: usize) -> ClassReport {
     let labels = layout.classes[target].labels.clone();
-    let mut confusion = vec![vec![0; labels.len()]; labels.len()];
+    let empty = || vec![vec![0; labels.len()]; labels.len()];
+    let (mut confusion, mut last_confusion) = (empty(), empty());
+    for last in runs.iter().filter_map(|records| records.last()) {
+        last_confusion[last.classes[target].0][last.classes[target].1] += 1;
+    }
     // Count, Σ confidence, Σ correct.
     let mut bins = [(0.0, 0.0, 0.0); BINS];
     for record in runs.iter().flatten() {
-        let (truth, likeliest, confidence) = record.classes[target];
+        let (truth, likeliest, confidence, _) = record.classes[target];
         confusion[truth][likeliest] += 1;
         let bin = &mut bins[((confidence * BINS as f64) as usize).min(BINS - 1)];
         let right = f64::from(u8::from(truth == likeliest));
@@ -291,6 +299,7 @@ fn classify(layout: &Layout, runs: &[Vec<Record>], target: usize) -> ClassReport
         last_accuracy: mean(runs.iter().filter_map(|records| records.last()).map(right)).unwrap_or(0.0),
         expected_calibration_error: bins.iter().map(|bin| (bin.1 - bin.2).abs()).sum::<f64>() / total.max(1.0),
         confusion,
+        last_confusion,
     }
 }
 

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Version of `prior.json`.
-pub const VERSION: u64 = 1;
+pub const VERSION: u64 = 2;
 
 /// File that makes a folder a prior.
 pub const FILE: &str = "prior.json";
@@ -144,7 +144,7 @@ impl Checkpoint {
     /// [`Error::Config`] if network and layout do not fit.
     pub fn inference(&self) -> Result<Inference, Error> {
         let dimensions = Dimensions::new(&self.network, &self.layout)?;
-        Ok(Inference::new(&dimensions, &self.normalisation, &self.parameters))
+        Ok(Inference::new(&dimensions, &self.normalisation, &self.parameters).with_memory(self.network.memory))
     }
 }
 
@@ -199,7 +199,7 @@ mod tests {
         assert!(message.ends_with("prior.json: not a readable prior file (truncated or edited?)"), "{message}");
         fs::write(&json, r#"{"version": 7, "unheard_of": 1}"#).unwrap();
         let message = load();
-        assert!(message.ends_with("format version 7, but this program reads version 1"), "{message}");
+        assert!(message.ends_with("format version 7, but this program reads version 2"), "{message}");
         fs::write(&json, text).unwrap();
 
         let mut other = checkpoint.layout.clone();

@@ -3,15 +3,25 @@
 //! Continuous targets: joint positions, object and obstacle (pose and velocity), then the 12 continuous values of Θ. Class targets: shape
 //! of the object, shape of the obstacle or none. Values that do not apply (sizes of a sphere beyond its radius, anything of an absent
 //! obstacle) are masked out of the loss.
+//!
+//! The published network is told no more of its targets than that. Here a target that a sensor measures is learnt as its difference from
+//! the measurement, a mass as its logarithm, sizes as extents (width, depth, height), which mean nearly the same for every shape, so that
+//! ten components need not be spent on telling a radius from a side, and a value of the state only down to a resolution: a body at rest has velocity 0 to the
+//! last bit, and a density that may grow there without bound would be all that a likelihood rewards. Noise of the size of the resolution
+//! is added to the targets, so that a calibrated network states at least that spread.
 
 use dataset::{Episode, Schema};
+use physics_model::action::ACTION_COUNT;
 use physics_model::sensor::observation_names;
 use physics_model::state::{BODY_LEN, State};
 use physics_model::theta::{CLASS_TARGETS, NO_OBSTACLE, THETA_LEN, THETA_NAMES};
-use physics_model::{BodyState, ObjectShape, Particle, PushModel, Theta};
+use physics_model::{Action, BodyState, ObjectShape, Particle, PushModel, Theta};
+use pomdp::{Purpose, Seed};
+use rand::RngExt as _;
+use rand_distr::StandardNormal;
 
 use crate::mixture::Draw;
-use crate::{ClassTarget, Layout, Sequence};
+use crate::{ClassTarget, Layout, Sequence, Transform};
 
 /// A suggested body that leans less than this stands upright, rad.
 const UPRIGHT_TOLERANCE_RAD: f64 = 0.3;
@@ -20,47 +30,153 @@ const RESTING_TOLERANCE_M: f64 = 0.015;
 /// Suggestions are clamped to at least this size and mass.
 const SMALLEST_SIZE_M: f64 = 0.01;
 const SMALLEST_MASS_KG: f64 = 0.02;
+/// And at most this mass.
+const LARGEST_MASS_KG: f64 = 100.0;
+/// Places of the sizes in Θ and the names of their targets.
+const SIZES: [(usize, &str); 6] = [
+    (5, "object_width_m"),
+    (6, "object_depth_m"),
+    (7, "object_height_m"),
+    (9, "obstacle_width_m"),
+    (10, "obstacle_depth_m"),
+    (11, "obstacle_height_m"),
+];
+/// Resolutions of a joint (rad) and of a body's position (m), quaternion, velocity (m/s) and angular velocity (rad/s): below what sensors
+/// measure and what a push depends on.
+const JOINT_RAD: f64 = 0.0005;
+const BODY: [(usize, f64); 4] = [(3, 0.001), (4, 0.005), (3, 0.005), (3, 0.05)];
+
+/// Whether the network is also told the action that led to an observation; the published one is not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ActionInput {
+    /// Observations alone.
+    Off,
+    /// One column an action: 1 for the one taken, else 0; all 0 at the start of an episode.
+    OneHot,
+}
+
+impl ActionInput {
+    /// What a prior of this layout takes in.
+    #[must_use]
+    pub fn of(layout: &Layout) -> Self {
+        if layout.observation.ends_with(&action_names()) { Self::OneHot } else { Self::Off }
+    }
+
+    fn columns(self, action: Option<usize>) -> impl Iterator<Item = f64> {
+        let columns = if self == Self::OneHot { ACTION_COUNT } else { 0 };
+        (0..columns).map(move |column| if action == Some(column) { 1.0 } else { 0.0 })
+    }
+}
+
+fn action_names() -> Vec<String> {
+    (0..ACTION_COUNT).map(|action| format!("action_{action}")).collect()
+}
 
 /// What a prior for this arm takes in and gives out.
 #[must_use]
-pub fn layout(robot: &str, model: &PushModel) -> Layout {
+pub fn layout(robot: &str, model: &PushModel, input: ActionInput) -> Layout {
     let joints = model.joint_count();
     let observation = observation_names(model.config().sensor.force, joints);
-    from_names(robot, observation, State::names(joints), THETA_NAMES.map(String::from).to_vec())
+    from_names(robot, observation, State::names(joints), THETA_NAMES.map(String::from).to_vec(), input)
 }
 
 /// What a prior trained on a dataset of this schema takes in and gives out.
 #[must_use]
-pub fn layout_of_dataset(schema: &Schema) -> Layout {
-    from_names(&schema.robot, schema.observation.clone(), schema.state.clone(), schema.theta.clone())
+pub fn layout_of_dataset(schema: &Schema, input: ActionInput) -> Layout {
+    from_names(&schema.robot, schema.observation.clone(), schema.state.clone(), schema.theta.clone(), input)
 }
 
-fn from_names(robot: &str, observation: Vec<String>, state: Vec<String>, theta: Vec<String>) -> Layout {
+/// The continuous targets that stay the same in an episode: Θ.
+#[must_use]
+pub fn static_columns(layout: &Layout) -> std::ops::Range<usize> {
+    layout.continuous.len() - THETA_LEN..layout.continuous.len()
+}
+
+/// The network's input after `action`.
+#[must_use]
+pub fn input(layout: &Layout, action: Option<Action>, observation: &[f64]) -> Vec<f64> {
+    let columns = ActionInput::of(layout).columns(action.map(Action::index));
+    observation.iter().copied().chain(columns).collect()
+}
+
+/// Names of the targets of Θ for a dataset's names of Θ.
+fn theta_targets(theta: Vec<String>) -> Vec<String> {
+    let rename = |name: String| match SIZES.iter().find(|(at, _)| THETA_NAMES[*at] == name) {
+        Some((_, target)) => (*target).to_string(),
+        None => name,
+    };
+    theta.into_iter().map(rename).collect()
+}
+
+/// Width, depth and height, m, of a shape of `size`: what a value stands for that does not apply is kept out by the mask.
+fn extents(shape: ObjectShape, size: [f64; 3]) -> ([f64; 3], [bool; 3]) {
+    match shape {
+        ObjectShape::Box => (size, [true; 3]),
+        ObjectShape::Cylinder => ([2.0 * size[0], 0.0, size[1]], [true, false, true]),
+        ObjectShape::Sphere => ([2.0 * size[0], 0.0, 0.0], [true, false, false]),
+    }
+}
+
+/// Inverse of [`extents`].
+fn sizes(shape: ObjectShape, [width, depth, height]: [f64; 3]) -> [f64; 3] {
+    match shape {
+        ObjectShape::Box => [width, depth, height],
+        ObjectShape::Cylinder => [width / 2.0, height, 0.0],
+        ObjectShape::Sphere => [width / 2.0, 0.0, 0.0],
+    }
+}
+
+/// Θ as its targets are given, and which of them apply.
+fn theta_row(theta: &Theta) -> ([f64; THETA_LEN], [bool; THETA_LEN]) {
+    let (mut values, mut applies) = (theta.continuous(), theta.applies());
+    let obstacle = theta.obstacle.as_ref().map(|o| (9, o.shape, o.size_m));
+    for (at, shape, size) in [Some((5, theta.object.shape, theta.object.size_m)), obstacle].into_iter().flatten() {
+        let (extents, apply) = extents(shape, size);
+        values[at..at + 3].copy_from_slice(&extents);
+        applies[at..at + 3].copy_from_slice(&apply);
+    }
+    (values, applies)
+}
+
+fn from_names(
+    robot: &str,
+    mut observation: Vec<String>,
+    state: Vec<String>,
+    theta: Vec<String>,
+    input: ActionInput,
+) -> Layout {
+    let continuous = [state, theta_targets(theta)].concat();
+    let transform = |name: &String| match observation.iter().position(|measured| measured == name) {
+        Some(column) => Transform::MinusObservation(column),
+        None if name.ends_with("_mass_kg") => Transform::Log,
+        None => Transform::Identity,
+    };
+    let transforms = continuous.iter().map(transform).collect();
+    if input == ActionInput::OneHot {
+        observation.extend(action_names());
+    }
     let classes = CLASS_TARGETS.iter().map(|(name, labels)| ClassTarget {
         name: (*name).into(),
         labels: labels.iter().map(ToString::to_string).collect(),
     });
-    Layout { robot: robot.into(), observation, continuous: [state, theta].concat(), classes: classes.collect() }
+    Layout { robot: robot.into(), observation, continuous, transforms, classes: classes.collect() }
 }
 
-/// A recorded episode as a training sequence.
+/// A recorded episode as a training sequence. The noise of the resolution depends on the episode's number alone.
 ///
 /// # Panics
 ///
 /// If the episode's columns are not those of [`layout_of_dataset`].
 #[must_use]
-pub fn sequence(episode: &Episode) -> Sequence {
+pub fn sequence(layout: &Layout, episode: &Episode) -> Sequence {
+    let action_input = ActionInput::of(layout);
+    let mut rng = Seed(0).stream(Purpose::Resolution, episode.episode);
     let steps = episode.rows();
     let theta: [f64; THETA_LEN] = episode.theta.as_slice().try_into().expect("theta has 12 values");
     let classes = [usize::from(episode.classes[0]), usize::from(episode.classes[1])];
-    let applies = Theta::from_parts(&theta, classes).applies();
-    let mut sequence = Sequence {
-        observations: episode.observation.clone(),
-        targets: Vec::new(),
-        mask: Vec::new(),
-        classes: Vec::new(),
-        steps,
-    };
+    let (theta, applies) = theta_row(&Theta::from_parts(&theta, classes));
+    let mut sequence =
+        Sequence { observations: Vec::new(), targets: Vec::new(), mask: Vec::new(), classes: Vec::new(), steps };
     for row in 0..steps {
         let mut state = episode.state(row).to_vec();
         let joints = state.len() - 2 * BODY_LEN;
@@ -68,39 +184,58 @@ pub fn sequence(episode: &Episode) -> Sequence {
             let at = joints + body * BODY_LEN + 3;
             positive_scalar(&mut state[at..at + 4]);
         }
+        for (value, resolution) in state.iter_mut().zip(resolutions(joints)) {
+            *value += resolution * rng.sample::<f64, _>(StandardNormal);
+        }
         let has_obstacle = classes[1] != NO_OBSTACLE;
-        sequence.targets.extend(state.iter().chain(&theta).map(|v| *v as f32));
         let state_mask = (0..state.len()).map(|i| has_obstacle || i < joints + BODY_LEN);
-        sequence.mask.extend(state_mask.chain(applies).map(|a| if a { 1.0 } else { 0.0 }));
+        let observation: Vec<f64> = episode.observation(row).iter().map(|v| f64::from(*v)).collect();
+        let values = state.iter().chain(&theta).zip(&layout.transforms);
+        for ((value, transform), applies) in values.zip(state_mask.chain(applies)) {
+            let written = if applies { transform.apply(*value, &observation) } else { 0.0 };
+            sequence.targets.push(written as f32);
+            sequence.mask.push(if applies { 1.0 } else { 0.0 });
+        }
+        let action = usize::try_from(episode.action[row]).ok();
+        sequence.observations.extend(episode.observation(row));
+        sequence.observations.extend(action_input.columns(action).map(|v| v as f32));
         sequence.classes.extend(&episode.classes);
     }
     sequence
 }
 
-/// First row of an episode in which the object has left its first position by more than a millimetre: something has touched it.
-#[must_use]
-pub fn first_contact(episode: &Episode) -> Option<usize> {
-    let joints = episode.state(0).len() - 2 * BODY_LEN;
-    let position = |row: usize| &episode.state(row)[joints..joints + 3];
-    (1..episode.rows()).find(|&row| {
-        let squared: f64 = position(row).iter().zip(position(0)).map(|(a, b)| (a - b) * (a - b)).sum();
-        squared.sqrt() > 0.001
-    })
+/// Resolution of every value of a state.
+fn resolutions(joints: usize) -> impl Iterator<Item = f64> {
+    let body = || BODY.into_iter().flat_map(|(count, resolution)| std::iter::repeat_n(resolution, count));
+    std::iter::repeat_n(JOINT_RAD, joints).chain(body()).chain(body())
 }
 
-/// A draw as a hypothesis on the table at `table_height_m`, inside the physical ranges: friction in [0, 1], positive masses and sizes,
-/// centre of mass inside the shape. A body drawn nearly upright and nearly resting is put upright and at rest height, because the mixture's
+/// First row of an episode in whose action `event` happened; none where it never did or the dataset does not tell.
+#[must_use]
+pub fn first_event(schema: &Schema, episode: &Episode, event: &str) -> Option<usize> {
+    let column = schema.events.iter().position(|name| name == event)?;
+    let mut happened = episode.events.iter().skip(column).step_by(schema.events.len());
+    happened.position(|happened| *happened == 1)
+}
+
+/// A draw made after `observation` as a hypothesis on the table at `table_height_m`, inside the physical ranges: friction in [0, 1],
+/// positive masses and sizes, centre of mass inside the shape. A body drawn nearly upright and nearly resting is put upright and at rest height, because the mixture's
 /// components are diagonal and cannot hold height and size together.
 #[must_use]
-pub fn particle(draw: &Draw, joints: usize, table_height_m: f64) -> Particle {
-    let (state, theta) = draw.values.split_at(joints + 2 * BODY_LEN);
+pub fn particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: usize, table_height_m: f64) -> Particle {
+    let written = draw.values.iter().zip(&layout.transforms);
+    let plain: Vec<f64> = written.map(|(value, transform)| transform.invert(*value, observation)).collect();
+    let (state, theta) = plain.split_at(joints + 2 * BODY_LEN);
     let mut values = [0.0; THETA_LEN];
     values.copy_from_slice(theta);
-    values[0] = values[0].max(SMALLEST_MASS_KG);
-    values[8] = values[8].max(SMALLEST_MASS_KG);
+    values[0] = values[0].clamp(SMALLEST_MASS_KG, LARGEST_MASS_KG);
+    values[8] = values[8].clamp(SMALLEST_MASS_KG, LARGEST_MASS_KG);
     values[4] = values[4].clamp(0.0, 1.0);
-    for index in [5, 6, 7, 9, 10, 11] {
-        values[index] = values[index].max(SMALLEST_SIZE_M);
+    for (at, class) in [(5, draw.classes[0]), (9, draw.classes[1])] {
+        let extents = [0, 1, 2].map(|i| values[at + i].max(SMALLEST_SIZE_M));
+        if let Some(shape) = ObjectShape::ALL.get(class) {
+            values[at..at + 3].copy_from_slice(&sizes(*shape, extents));
+        }
     }
     let mut theta = Theta::from_parts(&values, [draw.classes[0], draw.classes[1]]);
     let object = &mut theta.object;
@@ -143,6 +278,8 @@ fn positive_scalar(quaternion: &mut [f64]) {
 
 #[cfg(test)]
 mod tests {
+    use physics_model::config::ForceSensing;
+
     use super::*;
 
     fn episode(classes: [u8; 2]) -> Episode {
@@ -159,12 +296,19 @@ mod tests {
             state: [state.clone(), state].concat(),
             theta: vec![0.5, 0.01, 0.0, 0.0, 0.3, 0.08, 0.07, 0.09, 1.0, 0.04, 0.1, 0.0],
             classes: classes.to_vec(),
+            events: vec![],
         }
+    }
+
+    fn layout(input: ActionInput) -> Layout {
+        let names = observation_names(ForceSensing::Wrist, 7);
+        from_names("sawyer", names, State::names(7), THETA_NAMES.map(String::from).to_vec(), input)
     }
 
     #[test]
     fn what_does_not_apply_is_masked() {
-        let count = |classes| sequence(&episode(classes)).mask.iter().sum::<f32>() / 2.0;
+        let layout = layout(ActionInput::Off);
+        let count = |classes| sequence(&layout, &episode(classes)).mask.iter().sum::<f32>() / 2.0;
         // 7 joints, 13 object, 5 + 3 of a box, 13 obstacle, 1 + 2 of a cylinder.
         assert_eq!(count([0, 1]), 7.0 + 13.0 + 8.0 + 13.0 + 3.0);
         // Sphere without obstacle: mass, depth of the centre of mass, friction, radius.
@@ -173,16 +317,58 @@ mod tests {
 
     #[test]
     fn a_target_comes_back_as_the_particle_it_was_made_from() {
-        let sequence = sequence(&episode([0, 1]));
+        let (layout, episode) = (layout(ActionInput::Off), episode([0, 1]));
+        let sequence = sequence(&layout, &episode);
+        assert!((f64::from(sequence.targets[33]) - 0.5_f64.ln()).abs() < 1e-6, "a mass is learnt as its logarithm");
         let values: Vec<f64> = sequence.targets[..45].iter().map(|v| f64::from(*v)).collect();
         let draw = Draw { values, classes: vec![0, 1], component: 0 };
-        let particle = particle(&draw, 7, -0.1);
+        let observation: Vec<f64> = episode.observation(0).iter().map(|v| f64::from(*v)).collect();
+        let particle = particle(&layout, &draw, &observation, 7, -0.1);
         assert_eq!(particle.theta.classes(), [0, 1]);
+        assert!(
+            (particle.theta.object.mass_kg - 0.5).abs() < 1e-6
+                && (particle.theta.obstacle.as_ref().unwrap().mass_kg - 1.0).abs() < 1e-6
+        );
         assert!((particle.theta.object.size_m[1] - 0.07).abs() < 1e-6);
+        // A cylinder of radius 4 cm and height 10 cm.
+        let obstacle = particle.theta.obstacle.as_ref().unwrap();
+        assert!((obstacle.size_m[0] - 0.04).abs() < 1e-6 && (obstacle.size_m[1] - 0.1).abs() < 1e-6, "{obstacle:?}");
         assert!((particle.state.object.position_m[2] - (-0.055)).abs() < 1e-7, "rests at half its height");
-        assert!((particle.state.object.yaw_rad() - 0.4).abs() < 1e-6);
+        // Up to five times the resolution.
+        assert!((particle.state.object.position_m[0] - 0.5).abs() < 0.005);
+        assert!((particle.state.object.yaw_rad() - 0.4).abs() < 0.06);
         // The obstacle's quaternion was given with the other sign.
-        assert!((particle.state.obstacle.unwrap().yaw_rad() - 0.4).abs() < 1e-6);
+        assert!((particle.state.obstacle.unwrap().yaw_rad() - 0.4).abs() < 0.06);
+    }
+
+    #[test]
+    fn measured_targets_are_differences_with_the_noise_of_the_resolution() {
+        let layout = layout(ActionInput::Off);
+        let measured = layout.transforms.iter().filter(|t| matches!(t, Transform::MinusObservation(_))).count();
+        assert_eq!(measured, 14, "7 joints and the object's pose");
+        // Null: noise of 1 mm about 0.5 − 0.5 = 0. n = 2 × 400 rows, standard error of the spread 2.5 %; tolerance 4 of them.
+        let mut squares = 0.0;
+        for number in 0..400 {
+            let mut episode = Episode { episode: number, ..episode([0, 1]) };
+            for row in 0..2 {
+                episode.observation[row * 20 + 13] = 0.5;
+            }
+            let sequence = sequence(&layout, &episode);
+            squares += sequence.targets.iter().skip(7).step_by(45).map(|v| f64::from(*v).powi(2)).sum::<f64>();
+        }
+        assert!(((squares / 800.0).sqrt() / 0.001 - 1.0).abs() < 0.1, "{squares}");
+    }
+
+    #[test]
+    fn actions_are_one_hot_columns_behind_the_observation() {
+        let layout = layout(ActionInput::OneHot);
+        let sequence = sequence(&layout, &episode([0, 1]));
+        assert_eq!(sequence.observations.len(), 2 * 30);
+        assert!(sequence.observations[20..30].iter().all(|v| *v == 0.0), "no action has led to the first row");
+        let second: Vec<f64> = sequence.observations[30..].iter().map(|v| f64::from(*v)).collect();
+        assert_eq!(second[20..], [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(input(&layout, Some(Action::ALL[2]), &second[..20]), second);
+        assert_eq!(input(&self::layout(ActionInput::Off), Some(Action::ALL[2]), &second[..20]), second[..20]);
     }
 
     #[test]
@@ -192,7 +378,8 @@ mod tests {
         values[34] = 9.0;
         values[37] = 1.7;
         values[38..41].copy_from_slice(&[-0.1, 0.05, 0.05]);
-        let particle = particle(&Draw { values, classes: vec![0, 3], component: 0 }, 7, 0.0);
+        let draw = Draw { values, classes: vec![0, 3], component: 0 };
+        let particle = particle(&layout(ActionInput::Off), &draw, &[0.0; 20], 7, 0.0);
         assert!(physics_model::feasible::check_theta(&particle.theta).is_ok(), "{:?}", particle.theta);
         assert!(particle.state.obstacle.is_none());
     }

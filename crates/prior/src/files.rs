@@ -85,15 +85,24 @@ pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, kind: &'static str, ve
 }
 
 fn write(dir: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
+    write_atomically(&dir.join(name), bytes)
+}
+
+/// Writes a file whole or not at all, with the folders above it.
+///
+/// # Errors
+///
+/// [`Error::Io`] if the disk refuses.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let dir = path.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(dir).map_err(Error::io(dir, "create"))?;
-    let path = dir.join(name);
     let mut builder = tempfile::Builder::new();
     // Temporary files are private by default; a prior is as readable as the user's other files.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(dir).map_err(Error::io(&path, "create"))?;
-    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(Error::io(&path, "write"))?;
-    file.persist(&path).map_err(|failed| Error::io(&path, "rename to")(failed.error))?;
+    let mut file = builder.tempfile_in(dir).map_err(Error::io(path, "create"))?;
+    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(Error::io(path, "write"))?;
+    file.persist(path).map_err(|failed| Error::io(path, "rename to")(failed.error))?;
     std::fs::File::open(dir).and_then(|dir| dir.sync_all()).map_err(Error::io(dir, "flush"))
 }
 

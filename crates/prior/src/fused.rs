@@ -59,6 +59,24 @@ impl<T: Real> Workspace<T> {
         self.rows(batch, None)
     }
 
+    /// Sums over the rows of `batch`, `[continuous]` each: squared standardised errors of the targets that apply and their number, the
+    /// components weighted by their responsibilities. Their ratio is 1 where the stated spread is right.
+    #[must_use]
+    pub fn moments(&mut self, parameters: &Parameters<T>, batch: &Batch<T>) -> (Vec<f64>, Vec<f64>) {
+        self.forward(parameters, batch, None);
+        let sizes = &self.dimensions;
+        let (targets, kinds) = (sizes.continuous, sizes.classes.len());
+        let (mut squares, mut counts) = (vec![0.0; targets], vec![0.0; targets]);
+        for (index, outputs) in self.outputs.chunks_exact(sizes.outputs()).take(batch.rows).enumerate() {
+            let at = index * targets..(index + 1) * targets;
+            let (target, mask) = (&batch.targets[at.clone()], &batch.mask[at]);
+            let classes = &batch.classes[index * kinds..(index + 1) * kinds];
+            let _ = self.row.loss(sizes, outputs, target, mask, classes);
+            self.row.add_moments(sizes, mask, &mut squares, &mut counts);
+        }
+        (squares, counts)
+    }
+
     /// As [`Workspace::loss`]; `self.gradient` becomes `scale` times the gradient of that sum.
     pub fn loss_and_gradient(
         &mut self,

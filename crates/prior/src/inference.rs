@@ -13,6 +13,8 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Inference {
     weights: Arc<Weights>,
+    /// Whether the state is carried from step to step.
+    memory: bool,
     /// Cell state, `[width]` per layer.
     cells: Vec<Vec<f32>>,
     /// Input of each layer followed by its hidden state, `[inputs + width]`.
@@ -65,6 +67,7 @@ impl Inference {
         let bias = (0..heads.len()).flat_map(|index| parameters.head(count, index).1).copied().collect();
         let states = (0..count).map(|layer| vec![0.0; sizes.layer_inputs(layer) + sizes.hidden[layer]]);
         Self {
+            memory: true,
             cells: sizes.hidden.iter().map(|&width| vec![0.0; width]).collect(),
             states: states.collect(),
             gates: vec![0.0; 4 * sizes.hidden.iter().max().copied().unwrap_or(0)],
@@ -78,6 +81,11 @@ impl Inference {
                 heads: (weight, bias),
             }),
         }
+    }
+
+    /// The same, but every step starts afresh unless `memory`.
+    pub(crate) fn with_memory(self, memory: bool) -> Self {
+        Self { memory, ..self }
     }
 
     /// Sizes of the network.
@@ -99,6 +107,9 @@ impl Inference {
     ///
     /// If `observation` is not as long as the layout.
     pub fn step(&mut self, observation: &[f64]) -> &Mixture {
+        if !self.memory {
+            self.reset();
+        }
         let weights = Arc::clone(&self.weights);
         assert_eq!(observation.len(), weights.dimensions.observations, "observation columns");
         let values = observation.iter().zip(&weights.normalisation.observation);

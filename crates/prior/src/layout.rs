@@ -14,8 +14,44 @@ pub struct Layout {
     pub observation: Vec<String>,
     /// Names of the continuous targets.
     pub continuous: Vec<String>,
+    /// How each continuous target is written.
+    pub transforms: Vec<Transform>,
     /// Categorical targets.
     pub classes: Vec<ClassTarget>,
+}
+
+/// How a continuous target is written, before it is normalised. Densities are those of the written values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Transform {
+    /// As it is.
+    Identity,
+    /// Its natural logarithm: for what is positive and skewed, such as a mass.
+    Log,
+    /// Its difference from this observation column of the same step: what is measured need not be recalled, only corrected.
+    MinusObservation(usize),
+}
+
+impl Transform {
+    /// `value` as the network learns it, given the observation of the same step.
+    #[must_use]
+    pub fn apply(self, value: f64, observation: &[f64]) -> f64 {
+        match self {
+            Self::Identity => value,
+            Self::Log => value.ln(),
+            Self::MinusObservation(column) => value - observation[column],
+        }
+    }
+
+    /// Inverse of [`Self::apply`].
+    #[must_use]
+    pub fn invert(self, written: f64, observation: &[f64]) -> f64 {
+        match self {
+            Self::Identity => written,
+            Self::Log => written.exp(),
+            Self::MinusObservation(column) => written + observation[column],
+        }
+    }
 }
 
 /// A categorical target, such as the object's shape.
@@ -39,12 +75,14 @@ impl Layout {
             let (found, expected) = (self.robot.clone(), expected.robot.clone());
             return Err(Error::Robot { path: path.to_path_buf(), found, expected });
         }
+        let transforms = |layout: &Self| layout.transforms.iter().map(|t| format!("{t:?}")).collect::<Vec<_>>();
         let describe = |targets: &[ClassTarget]| -> Vec<String> {
             targets.iter().map(|target| format!("{} [{}]", target.name, target.labels.join(", "))).collect()
         };
         let parts = [
             ("observation", self.observation.clone(), expected.observation.clone()),
             ("continuous target", self.continuous.clone(), expected.continuous.clone()),
+            ("transform", transforms(self), transforms(expected)),
             ("class target", describe(&self.classes), describe(&expected.classes)),
         ];
         for (part, found, expected) in parts {
@@ -58,7 +96,7 @@ impl Layout {
     }
 }
 
-/// One episode as the network sees it, in original units.
+/// One episode as the network sees it: observations in original units, targets as the layout's transforms write them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sequence {
     /// Observations, `[steps, observation]`, row-major.
@@ -74,6 +112,24 @@ pub struct Sequence {
 }
 
 impl Sequence {
+    /// Every step as a sequence of its own.
+    #[must_use]
+    pub fn single_steps(&self) -> Vec<Self> {
+        let row = |values: &[f32], step: usize| {
+            let width = values.len() / self.steps;
+            values[step * width..(step + 1) * width].to_vec()
+        };
+        let kinds = self.classes.len() / self.steps.max(1);
+        let single = |step: usize| Self {
+            observations: row(&self.observations, step),
+            targets: row(&self.targets, step),
+            mask: row(&self.mask, step),
+            classes: self.classes[step * kinds..(step + 1) * kinds].to_vec(),
+            steps: 1,
+        };
+        (0..self.steps).map(single).collect()
+    }
+
     /// Checks sizes and values of sequence number `index` against `layout`.
     ///
     /// # Errors
@@ -132,6 +188,7 @@ pub(crate) mod tests {
             robot: "sawyer".into(),
             observation: names("observation", inputs),
             continuous: names("target", outputs),
+            transforms: vec![Transform::Identity; outputs],
             classes: classes.collect(),
         }
     }
@@ -154,9 +211,26 @@ pub(crate) mod tests {
         let message = ours.check(&theirs, path).unwrap_err().to_string();
         assert_eq!(message, "p.json: continuous target 0 is `target_0`, but this problem has `target_1`");
         let mut theirs = ours.clone();
+        theirs.transforms[2] = Transform::MinusObservation(1);
+        let message = ours.check(&theirs, path).unwrap_err().to_string();
+        assert_eq!(message, "p.json: transform 2 is `Identity`, but this problem has `MinusObservation(1)`");
+        let mut theirs = ours.clone();
         theirs.classes[0].labels.pop();
         let message = ours.check(&theirs, path).unwrap_err().to_string();
         assert!(message.starts_with("p.json: class target 0 is `class_0 [label_0, label_1, label_2]`"), "{message}");
+    }
+
+    #[test]
+    fn a_transform_and_its_inverse_cancel() {
+        let observation = [4.0, -0.25];
+        for (transform, value, written) in [
+            (Transform::Identity, 2.0, 2.0),
+            (Transform::Log, std::f64::consts::E, 1.0),
+            (Transform::MinusObservation(1), 0.5, 0.75),
+        ] {
+            assert_eq!(transform.apply(value, &observation), written);
+            assert_eq!(transform.invert(written, &observation), value);
+        }
     }
 
     #[test]

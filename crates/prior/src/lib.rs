@@ -11,12 +11,13 @@
 //!
 //! ```
 //! use pomdp::{Purpose, Seed};
-//! use prior::{GradientPath, Layout, NetworkConfig, Sequence, TrainConfig, Trainer};
+//! use prior::{GradientPath, Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, Transform};
 //!
 //! let layout = Layout {
 //!     robot: "sawyer".into(),
 //!     observation: vec!["force".into()],
 //!     continuous: vec!["mass".into()],
+//!     transforms: vec![Transform::Identity],
 //!     classes: vec![],
 //! };
 //! // Twenty episodes of one step, in which the mass is twice the force.
@@ -26,8 +27,9 @@
 //! };
 //! let data: Vec<Sequence> = (0..20).map(episode).collect();
 //! let config = TrainConfig {
-//!     network: NetworkConfig { hidden: vec![8], components: 2 },
+//!     network: NetworkConfig { hidden: vec![8], components: 2, memory: true },
 //!     learning_rate: 0.01,
+//!     schedule: Schedule::Constant,
 //!     batch: 8,
 //!     chunks: 2,
 //!     held_out: 0.2,
@@ -36,6 +38,7 @@
 //!     clip_norm: None,
 //!     weight_decay: 0.0,
 //!     dropout: 0.0,
+//!     rescale: true,
 //!     gradient: GradientPath::Fused,
 //! };
 //! let mut trainer = Trainer::new(config, layout, &data, Seed(1))?;
@@ -62,17 +65,27 @@ pub mod mixture;
 pub mod network;
 pub mod normalise;
 pub mod parameters;
+pub mod pictures;
 pub mod suggest;
 pub mod train;
 
-pub use calibrate::{Baseline, Calibration, Episode, calibrate};
+pub use calibrate::{Baseline, Calibration, Episode, Models, calibrate};
 pub use checkpoint::{Checkpoint, TrainingFacts};
 pub use error::Error;
-pub use files::FileRef;
+pub use files::{FileRef, write_atomically};
 pub use inference::Inference;
-pub use layout::{ClassTarget, Layout, Sequence};
+pub use layout::{ClassTarget, Layout, Sequence, Transform};
 pub use mixture::{Draw, Mixture};
 pub use normalise::Normalisation;
 pub use parameters::{Dimensions, NetworkConfig, Parameters};
 pub use suggest::Suggester;
-pub use train::{EpochReport, GradientPath, TrainConfig, Trainer, curve_csv, is_held_out};
+
+pub use train::{EpochReport, GradientPath, Schedule, TrainConfig, Trainer, curve_csv, is_held_out};
+
+/// The nearest folder at or above `start` with scenarios, else `start`: the programs of this crate need no scenario, only a place for
+/// their default folders.
+#[must_use]
+pub fn project_root(start: &std::path::Path) -> std::path::PathBuf {
+    let found = start.ancestors().find(|folder| folder.join("scenarios/base.toml").is_file());
+    found.unwrap_or(start).to_path_buf()
+}

@@ -1,7 +1,6 @@
 //! `cargo xtask train`: trains the prior on a dataset, epoch by epoch, resumable.
 
 use std::collections::BTreeMap;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -12,9 +11,9 @@ use clap::Parser;
 use dataset::Reader;
 use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
+use prior::features::{self, ActionInput};
 use prior::{
-    Checkpoint, Episode, GradientPath, Layout, NetworkConfig, Sequence, TrainConfig, Trainer, calibrate, curve_csv,
-    features, is_held_out,
+    GradientPath, Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, curve_csv, write_atomically,
 };
 
 /// Trains the prior: LSTM with a mixture density head over (s, Θ).
@@ -39,6 +38,18 @@ struct Arguments {
     /// Probability that an output of an LSTM layer is dropped while training; the paper has none.
     #[arg(long, default_value_t = 0.0)]
     dropout: f64,
+    /// Decoupled weight decay; the paper has none.
+    #[arg(long, default_value_t = 0.0)]
+    weight_decay: f64,
+    /// Keeps the learning rate at 0.001, as published, instead of letting it fall along half a cosine.
+    #[arg(long)]
+    constant_rate: bool,
+    /// Tells the network the action that led to an observation; the paper does not.
+    #[arg(long)]
+    action_input: bool,
+    /// Forgets everything after each step: what `calibrate --memoryless` compares with.
+    #[arg(long)]
+    memoryless: bool,
     /// Root seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -87,7 +98,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<bool> {
     let root = match &arguments.root {
         Some(root) => root.clone(),
-        None => project_root(&std::env::current_dir()?),
+        None => prior::project_root(&std::env::current_dir()?),
     };
     let runs = root.join(if arguments.quick { "runs/quick" } else { "runs" });
     let data = arguments.data.clone().unwrap_or_else(|| runs.join("data").join(&arguments.robot));
@@ -106,19 +117,23 @@ fn run(arguments: &Arguments) -> Result<bool> {
         ));
     }
     let recorded = reader.episodes()?;
-    let sequences: Vec<Sequence> = recorded.iter().map(features::sequence).collect();
-    let layout = features::layout_of_dataset(&manifest.schema);
+    let input = if arguments.action_input { ActionInput::OneHot } else { ActionInput::Off };
+    let layout = features::layout_of_dataset(&manifest.schema, input);
+    let sequences: Vec<Sequence> = recorded.iter().map(|episode| features::sequence(&layout, episode)).collect();
+    drop(recorded);
     let config = TrainConfig {
-        network: NetworkConfig { hidden: vec![128, 128], components: 10 },
+        network: NetworkConfig { hidden: vec![128, 128], components: 10, memory: !arguments.memoryless },
         learning_rate: 0.001,
+        schedule: if arguments.constant_rate { Schedule::Constant } else { Schedule::Cosine },
         batch: 128,
         chunks: 4,
         held_out: 0.1,
         max_epochs: arguments.epochs.unwrap_or(if arguments.quick { 10 } else { 150 }) as usize,
         patience: arguments.patience,
         clip_norm: Some(10.0),
-        weight_decay: 0.0,
+        weight_decay: arguments.weight_decay,
         dropout: arguments.dropout,
+        rescale: true,
         gradient: GradientPath::Fused,
     };
     let seed = Seed(arguments.seed);
@@ -138,8 +153,16 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     let checkpoint = trainer.checkpoint(provenance);
     checkpoint.save(&out).context(Failed)?;
-    write(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes())?;
-    report(&checkpoint, &layout, &config, seed, &recorded, &sequences, &out)?;
+    write_atomically(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes()).context(Failed)?;
+    prior::pictures::learning_curve(&arguments.robot, trainer.curve()).save(&out.join("curve")).context(Failed)?;
+    println!(
+        "{}: best epoch {} of {}, held-out {:.3} nats a step on {} episodes",
+        out.display(),
+        checkpoint.facts.best_epoch,
+        checkpoint.facts.curve.len(),
+        checkpoint.facts.held_out_nll.unwrap_or(f64::NAN),
+        checkpoint.facts.held_out_episodes,
+    );
     Ok(true)
 }
 
@@ -158,9 +181,7 @@ fn open_trainer(
         if insist {
             return Err(anyhow!("{}: --resume expected an interrupted training, found none", state.display()));
         }
-        if let Some(file) =
-            ["prior.json", "curve.csv", "calibration.json"].map(|name| out.join(name)).iter().find(|f| f.exists())
-        {
+        if let Some(file) = ["prior.json", "curve.csv"].map(|name| out.join(name)).iter().find(|f| f.exists()) {
             let state = state.display();
             return Err(anyhow!(
                 "{}: is there without {state} beside it: choose another --out or remove it",
@@ -219,51 +240,4 @@ fn train(trainer: &mut Trainer, config: &TrainConfig, state: &Path) -> Result<bo
     }
     bar.finish_and_clear();
     Ok(true)
-}
-
-/// Calibration on the held-out episodes: written beside the prior, its heads printed.
-fn report(
-    checkpoint: &Checkpoint,
-    layout: &Layout,
-    config: &TrainConfig,
-    seed: Seed,
-    recorded: &[dataset::Episode],
-    sequences: &[Sequence],
-    out: &Path,
-) -> Result<()> {
-    let held_out: Vec<Episode<'_>> = (0..sequences.len())
-        .filter(|&index| is_held_out(seed, index, config.held_out))
-        .map(|index| Episode { sequence: &sequences[index], contact: features::first_contact(&recorded[index]) })
-        .collect();
-    let calibration = calibrate(&checkpoint.inference()?, layout, &checkpoint.baseline, &held_out);
-    let json = serde_json::to_string_pretty(&calibration)? + "\n";
-    write(&out.join("calibration.json"), json.as_bytes())?;
-    println!(
-        "{}: best epoch {} of {}, held-out {:.3} nats a step on {} episodes, baseline {:.3}",
-        out.display(),
-        checkpoint.facts.best_epoch,
-        checkpoint.facts.curve.len(),
-        calibration.nll,
-        calibration.episodes,
-        calibration.baseline_nll,
-    );
-    Ok(())
-}
-
-/// The nearest folder at or above `start` with scenarios, else `start`: training needs no scenario, only a place for its default folders.
-fn project_root(start: &Path) -> PathBuf {
-    let found = start.ancestors().find(|folder| folder.join("scenarios/base.toml").is_file());
-    found.unwrap_or(start).to_path_buf()
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).with_context(|| format!("{}: cannot write", folder.display()))?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    file.persist(path).with_context(|| format!("{}: cannot write", path.display()))?;
-    Ok(())
 }

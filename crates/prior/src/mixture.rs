@@ -145,27 +145,48 @@ impl Mixture {
         }))
     }
 
-    /// P(target ≤ value), given the classes if they are given.
+    /// P(target ≤ value), given that each class target has one of its `labels` (`[class targets][labels]`); all of them ask for the
+    /// marginal.
     ///
     /// # Panics
     ///
     /// If `target` is not a continuous target.
     #[must_use]
-    pub fn cumulative(&self, target: usize, value: f64, classes: Option<&[usize]>) -> f64 {
-        assert!(target < self.continuous, "target {target} of {}", self.continuous);
-        let weights: Vec<f64> = match classes {
-            None => self.weights.clone(),
-            Some(classes) => {
-                let joint: Vec<f64> = self.joint(classes).collect();
-                let total = log_sum_exp(joint.iter().copied());
-                joint.iter().map(|log_joint| (log_joint - total).exp()).collect()
-            }
-        };
-        let each = weights.iter().enumerate().map(|(component, weight)| {
+    pub fn cumulative(&self, target: usize, value: f64, labels: &[Vec<bool>]) -> f64 {
+        let each = self.given(labels).into_iter().enumerate().map(|(component, weight)| {
             let (mean, stddev) = (self.means(component)[target], self.stddevs(component)[target]);
             weight * normal_cumulative((value - mean) / stddev)
         });
         each.sum()
+    }
+
+    /// Standard deviation of continuous target `target`, given the same.
+    ///
+    /// # Panics
+    ///
+    /// If `target` is not a continuous target.
+    #[must_use]
+    pub fn stddev(&self, target: usize, labels: &[Vec<bool>]) -> f64 {
+        let (mut mean, mut square) = (0.0, 0.0);
+        for (component, weight) in self.given(labels).into_iter().enumerate() {
+            let (m, s) = (self.means(component)[target], self.stddevs(component)[target]);
+            (mean, square) = (mean + weight * m, square + weight * (m * m + s * s));
+        }
+        (square - mean * mean).max(0.0).sqrt()
+    }
+
+    /// Weights of the components given that each class target has one of its `labels`.
+    fn given(&self, labels: &[Vec<bool>]) -> Vec<f64> {
+        let probability = |component: usize, target: usize| -> f64 {
+            let logs = self.log_classes(component, target).iter().zip(&labels[target]);
+            logs.filter(|(_, allowed)| **allowed).map(|(log, _)| log.exp()).sum()
+        };
+        let joint = |(component, weight): (usize, &f64)| {
+            weight * (0..self.sizes.len()).map(|target| probability(component, target)).product::<f64>()
+        };
+        let joint: Vec<f64> = self.weights.iter().enumerate().map(joint).collect();
+        let total: f64 = joint.iter().sum();
+        joint.into_iter().map(|weight| weight / total.max(f64::MIN_POSITIVE)).collect()
     }
 
     /// One draw.
@@ -313,12 +334,19 @@ mod tests {
         assert!((share(&|d| d.component == 1) - 0.75).abs() < tolerance);
         assert!((share(&|d| d.classes[1] == 2) - mixture.class_probabilities(1)[2]).abs() < tolerance);
         assert!((mixture.class_probabilities(1)[2] - (0.25 * 0.5 + 0.75 * 0.1)).abs() < 1e-12);
-        assert!((share(&|d| d.values[0] <= 1.0) - mixture.cumulative(0, 1.0, None)).abs() < tolerance);
-        let given = [1, 2];
-        let matching: Vec<&Draw> = draws.iter().filter(|draw| draw.classes == given).collect();
+        assert!(
+            (share(&|d| d.values[0] <= 1.0) - mixture.cumulative(0, 1.0, &[vec![true; 2], vec![true; 3]])).abs()
+                < tolerance
+        );
+        let given = [vec![false, true], vec![true, false, true]];
+        let matching: Vec<&Draw> = draws.iter().filter(|draw| draw.classes[0] == 1 && draw.classes[1] != 1).collect();
         let below = matching.iter().filter(|draw| draw.values[0] <= 1.0).count() as f64 / matching.len() as f64;
         let tolerance = 5.0 * 0.5 / (matching.len() as f64).sqrt();
-        assert!((below - mixture.cumulative(0, 1.0, Some(&given))).abs() < tolerance, "{below}");
+        assert!((below - mixture.cumulative(0, 1.0, &given)).abs() < tolerance, "{below}");
+        let mean = matching.iter().map(|draw| draw.values[0]).sum::<f64>() / matching.len() as f64;
+        let variance = matching.iter().map(|draw| (draw.values[0] - mean).powi(2)).sum::<f64>() / matching.len() as f64;
+        // The standard error of the spread of some 16,000 draws is below 1 %.
+        assert!((mixture.stddev(0, &given) / variance.sqrt() - 1.0).abs() < 0.05, "{variance}");
     }
 
     #[test]

@@ -3,9 +3,8 @@
 use crate::{Layout, Sequence};
 use serde::{Deserialize, Serialize};
 
-/// Normalised observations are clipped to ± this many standard deviations, in training and in use: a force spike or an
-/// object that left the table must not drive the network far outside of what it has seen.
-pub const OBSERVATION_LIMIT: f64 = 10.0;
+/// Interquartile range of a Gaussian in standard deviations.
+const QUARTILES: f64 = 1.349;
 
 /// Below this fraction of (1 + |mean|) a column counts as constant and keeps its unit.
 ///
@@ -13,17 +12,32 @@ pub const OBSERVATION_LIMIT: f64 = 10.0;
 /// noise would turn that noise into a signal and the density into an arbitrarily high spike.
 const CONSTANT: f64 = 1e-6;
 
-/// Mean and standard deviation of a column.
+/// Centre and spread of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scale {
-    /// Mean over the rows that apply.
+    /// Mean over the rows that apply; of an observation the median.
     pub mean: f64,
-    /// Standard deviation over the rows that apply; 1 for a column without spread.
+    /// Standard deviation over the rows that apply, of an observation from its quartiles; 1 for a column without spread.
     pub stddev: f64,
 }
 
 impl Scale {
+    /// Median and interquartile range (as the standard deviation of the Gaussian that has it): the scale of what is usual, where a
+    /// blocked push reads a hundred times the force of a free one. A column of which three quarters are equal falls back on
+    /// [`Scale::fit`].
+    #[must_use]
+    pub fn robust(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let at = |share: f64| values[((values.len() - 1) as f64 * share) as usize];
+        if values.is_empty() {
+            return Self::fit(std::iter::empty());
+        }
+        let (mean, stddev) = (at(0.5), (at(0.75) - at(0.25)) / QUARTILES);
+        let constant = stddev < CONSTANT * (1.0 + f64::abs(mean));
+        if constant { Self::fit(values.into_iter()) } else { Self { mean, stddev } }
+    }
+
     /// Scale of the values that `values` yields.
     #[must_use]
     pub fn fit(values: impl Iterator<Item = f64>) -> Self {
@@ -57,12 +71,8 @@ impl Normalisation {
     pub fn fit(layout: &Layout, sequences: &[&Sequence]) -> Self {
         let (inputs, outputs) = (layout.observation.len(), layout.continuous.len());
         let observation = (0..inputs).map(|column| {
-            Scale::fit(
-                sequences
-                    .iter()
-                    .flat_map(|s| s.observations.iter().skip(column).step_by(inputs))
-                    .map(|&v| f64::from(v)),
-            )
+            let rows = sequences.iter().flat_map(|s| s.observations.iter().skip(column).step_by(inputs));
+            Scale::robust(rows.map(|&v| f64::from(v)).collect())
         });
         let continuous = (0..outputs).map(|column| {
             let values = sequences.iter().flat_map(|s| s.targets.iter().zip(&s.mask).skip(column).step_by(outputs));
@@ -105,9 +115,10 @@ impl Normalisation {
     }
 }
 
-/// One observation as the network takes it.
+/// One observation as the network takes it: linear within the usual, logarithmic beyond. A force spike or an object that left the table
+/// must neither drive the network far outside of what it has seen nor look like any other.
 pub(crate) fn normalise_observation(value: f64, scale: &Scale) -> f32 {
-    ((value - scale.mean) / scale.stddev).clamp(-OBSERVATION_LIMIT, OBSERVATION_LIMIT) as f32
+    ((value - scale.mean) / scale.stddev).asinh() as f32
 }
 
 #[cfg(test)]
@@ -127,9 +138,8 @@ mod tests {
         };
         let fitted = Normalisation::fit(&layout, &[&sequence]);
         let spread = (8.0_f64 / 3.0).sqrt();
-        assert!(
-            (fitted.observation[0].mean - 3.0).abs() < 1e-12 && (fitted.observation[0].stddev - spread).abs() < 1e-12
-        );
+        let robust = fitted.observation[0];
+        assert!((robust.mean - 3.0).abs() < 1e-12 && (robust.stddev - 2.0 / 1.349).abs() < 1e-12, "{robust:?}");
         assert_eq!(fitted.continuous[1], Scale { mean: 9.0, stddev: 1.0 }, "a constant column keeps its unit");
         let normalised = fitted.apply(&sequence);
         assert!((f64::from(normalised.targets[4]) - 2.0 / spread).abs() < 1e-6);
@@ -149,9 +159,21 @@ mod tests {
     }
 
     #[test]
-    fn spikes_are_clipped() {
+    fn spikes_are_compressed_and_stay_apart() {
         let scale = Scale { mean: 1.0, stddev: 2.0 };
-        assert_eq!(normalise_observation(500.0, &scale), 10.0);
-        assert_eq!(normalise_observation(-3.0, &scale), -2.0);
+        let at = |value| normalise_observation(value, &scale);
+        assert!((at(1.02) - 0.01).abs() < 1e-6, "linear where it is usual");
+        assert!(at(500.0) < 7.0 && at(1000.0) - at(500.0) > 0.6, "{} {}", at(500.0), at(1000.0));
+        assert_eq!(at(-3.0), -(2.0_f32.asinh()));
+    }
+
+    #[test]
+    fn rare_spikes_do_not_widen_the_scale() {
+        let usual = (0..100).map(|i| f64::from(i) / 100.0);
+        let scale = Scale::robust(usual.chain([1e6; 5]).collect());
+        assert!((scale.stddev - 0.52 / 1.349).abs() < 0.01, "{scale:?}");
+        // One-hot columns are 0 in nine rows of ten.
+        let rare = Scale::robust([vec![0.0; 9], vec![1.0]].concat());
+        assert!((rare.mean - 0.1).abs() < 1e-12 && (rare.stddev - 0.3).abs() < 1e-12, "{rare:?}");
     }
 }

@@ -13,6 +13,8 @@ pub struct NetworkConfig {
     pub hidden: Vec<usize>,
     /// Number of mixture components.
     pub components: usize,
+    /// Whether the state is carried from step to step; without it every observation stands alone, which is what memory is measured against.
+    pub memory: bool,
 }
 
 /// All sizes of a network for one layout.
@@ -256,7 +258,7 @@ pub(crate) mod tests {
     #[test]
     fn a_network_without_outputs_is_refused() {
         let layout = crate::layout::tests::layout(2, 0, &[]);
-        let config = NetworkConfig { hidden: vec![4], components: 2 };
+        let config = NetworkConfig { hidden: vec![4], components: 2, memory: true };
         let message = Dimensions::new(&config, &layout).unwrap_err().to_string();
         assert_eq!(
             message,

@@ -5,15 +5,18 @@ use std::path::Path;
 use physics_model::{Action, Observation, Particle, PushModel};
 use pomdp::{Prior, Rng};
 
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::{Checkpoint, FILE};
+use crate::features::{self, ActionInput};
 use crate::mixture::Mixture;
-use crate::{Error, Inference, features};
+use crate::{Error, Inference, Layout};
 
 /// A prior that follows one episode. Clones share the weights and have an episode of their own.
 #[derive(Clone, Debug)]
 pub struct Suggester {
     inference: Inference,
-    latest: Option<Mixture>,
+    layout: Layout,
+    /// After the latest observation, and that observation.
+    latest: Option<(Mixture, Vec<f64>)>,
     joints: usize,
     hash: String,
 }
@@ -25,9 +28,11 @@ impl Suggester {
     ///
     /// What [`Checkpoint::load`] refuses: a missing or damaged file, another version, arm or layout.
     pub fn load(folder: &Path, robot: &str, model: &PushModel) -> Result<Self, Error> {
-        let checkpoint = Checkpoint::load(folder, Some(&features::layout(robot, model)))?;
-        let hash = checkpoint.weights_hash().to_string();
-        Ok(Self { inference: checkpoint.inference()?, latest: None, joints: model.joint_count(), hash })
+        let checkpoint = Checkpoint::load(folder, None)?;
+        let expected = features::layout(robot, model, ActionInput::of(&checkpoint.layout));
+        checkpoint.layout.check(&expected, &folder.join(FILE))?;
+        let (inference, hash) = (checkpoint.inference()?, checkpoint.weights_hash());
+        Ok(Self { inference, layout: expected, latest: None, joints: model.joint_count(), hash })
     }
 
     /// Hash of the weights.
@@ -39,20 +44,20 @@ impl Suggester {
     /// The mixture after the latest observation; `None` before the first.
     #[must_use]
     pub fn mixture(&self) -> Option<&Mixture> {
-        self.latest.as_ref()
+        self.latest.as_ref().map(|(mixture, _)| mixture)
     }
 
     /// A draw from the mixture; `None` before the first observation.
     pub fn sample(&self, table_height_m: f64, rng: &mut Rng) -> Option<Particle> {
-        let draw = self.latest.as_ref()?.sample(rng);
-        Some(features::particle(&draw, self.joints, table_height_m))
+        let (mixture, observation) = self.latest.as_ref()?;
+        Some(features::particle(&self.layout, &mixture.sample(rng), observation, self.joints, table_height_m))
     }
 
     /// The mean of the strongest component with its likeliest shapes; `None` before the first observation.
     #[must_use]
     pub fn strongest(&self, table_height_m: f64) -> Option<Particle> {
-        let draw = self.latest.as_ref()?.strongest();
-        Some(features::particle(&draw, self.joints, table_height_m))
+        let (mixture, observation) = self.latest.as_ref()?;
+        Some(features::particle(&self.layout, &mixture.strongest(), observation, self.joints, table_height_m))
     }
 }
 
@@ -64,10 +69,10 @@ impl Prior<Action, Observation> for Suggester {
         self.latest = None;
     }
 
-    /// The published network takes in observations alone.
-    fn suggest(&mut self, _action: Option<&Action>, observation: &Observation) -> Mixture {
-        let mixture = self.inference.step(&observation.0).clone();
-        self.latest = Some(mixture.clone());
+    fn suggest(&mut self, action: Option<&Action>, observation: &Observation) -> Mixture {
+        let input = features::input(&self.layout, action.copied(), &observation.0);
+        let mixture = self.inference.step(&input).clone();
+        self.latest = Some((mixture.clone(), observation.0.clone()));
         mixture
     }
 }

@@ -1,5 +1,6 @@
 //! The training loop: seeded, resumable, with early stopping on held-out episodes.
 
+mod rescale;
 mod split;
 mod state;
 mod step;
@@ -30,14 +31,39 @@ pub enum GradientPath {
     Autodiff,
 }
 
+/// Course of the learning rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Schedule {
+    /// The same in every epoch, as published.
+    Constant,
+    /// Half a cosine over `max_epochs`, down to nearly 0 (Loshchilov and Hutter 2017, without restarts).
+    Cosine,
+}
+
+impl Schedule {
+    /// Share of the first learning rate in `epoch`, counted from 1.
+    fn share(self, epoch: usize, max_epochs: usize) -> f64 {
+        match self {
+            Self::Constant => 1.0,
+            Self::Cosine => {
+                let done = (epoch as f64 - 0.5) / max_epochs.max(1) as f64;
+                0.5 * (1.0 + (std::f64::consts::PI * done).cos())
+            }
+        }
+    }
+}
+
 /// Settings of a training run; every one of them changes the weights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainConfig {
     /// Shape of the network.
     pub network: NetworkConfig,
-    /// Adam's step size.
+    /// Adam's step size, at the beginning.
     pub learning_rate: f64,
+    /// How it goes on.
+    pub schedule: Schedule,
     /// Sequences per optimiser step.
     pub batch: usize,
     /// Parts that a batch is dealt into for the fused gradient, whose sums are added in this order: at least the number of
@@ -55,6 +81,8 @@ pub struct TrainConfig {
     pub weight_decay: f64,
     /// Probability that an output of an LSTM layer is dropped on its way up, in steps of 1/256; 0 for none.
     pub dropout: f64,
+    /// Whether the stated spread of each target is multiplied by one factor, fitted on the held-out episodes, in the end.
+    pub rescale: bool,
     /// Which code computes the gradient.
     pub gradient: GradientPath,
 }
@@ -191,22 +219,29 @@ impl Trainer {
     /// Held-out negative log-likelihood of the present weights, nats a step in original units.
     #[must_use]
     pub fn held_out_nll(&self) -> f64 {
+        self.nll_of(&self.parameters)
+    }
+
+    fn nll_of(&self, parameters: &Parameters<f32>) -> f64 {
         let references: Vec<&Sequence> = self.held_out.iter().collect();
         let sums: Vec<(f64, usize)> = references
             .par_chunks(64)
             .map(|sequences| {
-                let batch = Batch::pack(sequences, &self.dimensions);
-                (Workspace::new(&self.dimensions).loss(&self.parameters, &batch), batch.rows)
+                let alone = step::alone(self.config.network.memory, sequences);
+                let sequences = alone.as_ref().map_or(sequences.to_vec(), |alone| alone.iter().collect());
+                let batch = Batch::pack(&sequences, &self.dimensions);
+                (Workspace::new(&self.dimensions).loss(parameters, &batch), batch.rows)
             })
             .collect();
         let (loss, rows) = sums.iter().fold((0.0, 0), |(loss, rows), part| (loss + part.0, rows + part.1));
         loss / rows as f64 + self.held_out_offset
     }
 
-    /// The best weights so far as a prior; `provenance` is what the program knows about the run.
+    /// The best weights so far as a prior, their spreads [rescaled](TrainConfig::rescale) if asked for; `provenance` is what the program knows about the run.
     #[must_use]
     pub fn checkpoint(&self, provenance: BTreeMap<String, String>) -> Checkpoint {
         let transitions = |sequences: &[Sequence]| sequences.iter().map(|sequence| sequence.steps).sum();
+        let parameters = if self.config.rescale { self.rescaled(&self.best) } else { self.best.clone() };
         let facts = TrainingFacts {
             config: self.config.clone(),
             seed: self.seed.0,
@@ -216,7 +251,7 @@ impl Trainer {
             held_out_episodes: self.held_out.len(),
             held_out_transitions: transitions(&self.held_out),
             best_epoch: self.curve.last().map_or(0, |last| last.best_epoch),
-            held_out_nll: self.curve.last().map(|last| last.best_held_out_nll),
+            held_out_nll: self.curve.last().map(|_| self.nll_of(&parameters)),
             curve: self.curve.clone(),
         };
         Checkpoint {
@@ -226,7 +261,7 @@ impl Trainer {
             baseline: self.baseline.clone(),
             facts,
             provenance,
-            parameters: self.best.clone(),
+            parameters,
         }
     }
 

@@ -22,6 +22,9 @@ enum Verb {
     /// Trains the prior.
     #[command(disable_help_flag = true)]
     Train(Rest),
+    /// Compares what the prior says of held-out episodes with the truth.
+    #[command(disable_help_flag = true)]
+    Calibrate(Rest),
     /// Plays trials of methods on a domain and prints the table.
     #[command(disable_help_flag = true)]
     Eval(Rest),
@@ -43,6 +46,7 @@ fn main() -> ExitCode {
     let result = match Menu::parse().verb {
         Verb::Datagen(rest) => program("datagen", &rest.arguments),
         Verb::Train(rest) => program("train", &rest.arguments),
+        Verb::Calibrate(rest) => program("calibrate", &rest.arguments),
         Verb::Eval(rest) => program("eval", &rest.arguments),
         Verb::Bench(rest) => program("bench", &rest.arguments),
         Verb::Ci => ci(),

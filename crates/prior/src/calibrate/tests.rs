@@ -1,5 +1,7 @@
 use super::*;
+use crate::fused::HALF_LOG_TAU;
 use crate::layout::tests::layout;
+use crate::normalise::{Normalisation, Scale};
 use crate::parameters::Parameters;
 use crate::parameters::tests::dimensions;
 use pomdp::{Purpose, Rng, Seed};
@@ -8,10 +10,11 @@ use rand_distr::StandardNormal;
 
 /// An inference that ignores its input and always suggests: y₀ ~ N(2, 3²), y₁ ~ N(0, 1) if the class is 1, and
 /// P(class 0) = P(class 1) = 1/2, told by two components, one a class.
-fn fixed_inference() -> (Inference, Layout, Normalisation) {
+fn fixed_inference(shift: f32) -> (Inference, Layout, Normalisation) {
     let sizes = dimensions(1, 2, &[2], &[2], 2);
     let mut parameters = Parameters::zeros(&sizes);
     // Means in normalised units: component 0 is lost on y₁.
+    parameters.tensors[4] = vec![0.0, shift];
     parameters.tensors[6] = vec![0.0, 40.0, 0.0, 0.0];
     parameters.tensors[10] = vec![9.0, -9.0, -9.0, 9.0];
     let mut layout = layout(1, 2, &[2]);
@@ -36,14 +39,23 @@ fn episodes(count: usize, spread: f32, rng: &mut Rng) -> Vec<Sequence> {
 }
 
 fn report(count: usize, spread: f32) -> Calibration {
-    let (inference, layout, normalisation) = fixed_inference();
+    shifted_report(count, spread, 0.0)
+}
+
+/// `shift` is the logit of class 1.
+fn shifted_report(count: usize, spread: f32, shift: f32) -> Calibration {
+    let (inference, layout, normalisation) = fixed_inference(shift);
     let sequences = episodes(count, spread, &mut Seed(4).stream(Purpose::Test, 0));
     let references: Vec<&Sequence> = sequences.iter().collect();
     let baseline = Baseline::fit(&layout, &normalisation, &references);
     let contact = |index: usize| if index.is_multiple_of(2) { Some(1) } else { None };
-    let held: Vec<Episode> =
-        sequences.iter().enumerate().map(|(i, sequence)| Episode { sequence, contact: contact(i) }).collect();
-    calibrate(&inference, &layout, &baseline, &held)
+    let held: Vec<Episode> = sequences
+        .iter()
+        .enumerate()
+        .map(|(i, sequence)| Episode { sequence, contact: contact(i), obstacle_touched: i.is_multiple_of(3) })
+        .collect();
+    let models = Models { network: &inference, baseline: &baseline, memoryless: Some(&inference) };
+    calibrate(models, &layout, 1..2, &held)
 }
 
 #[test]
@@ -71,7 +83,14 @@ fn likelihood_equals_the_entropy_of_the_truth() {
     assert!((honest.nll - exact).abs() < 0.05, "{} {exact}", honest.nll);
     // The truth is a product of marginals, so the baseline is as good.
     assert!((honest.baseline_nll - exact).abs() < 0.05, "{} {exact}", honest.baseline_nll);
+    assert_eq!(honest.memoryless_nll, Some(honest.nll), "the same network");
     assert_eq!(honest.sharpening.len(), 2);
+    let [first, second] = honest.sharpening.as_slice() else { panic!("{} steps", honest.sharpening.len()) };
+    assert_eq!((first.before_contact.count, first.since_contact.count, second.since_contact.count), (4000, 2000, 0));
+    // y₁, known as well as before any observation: half of ½ ln(2πe), and ln 2 for the class.
+    assert!((first.all.static_nll.network - 0.5 * entropy - 2.0_f64.ln()).abs() < 0.05, "{first:?}");
+    assert!((first.all.spread[0] - 1.0).abs() < 0.05, "{first:?}");
+    assert!((first.all.class_probability[0] - 0.5).abs() < 1e-3, "{first:?}");
     assert_eq!((honest.sharpening[0].after_contact.count, honest.sharpening[1].after_contact.count), (0, 2000));
     assert_eq!(honest.sharpening[1].all.count, 4000);
 }
@@ -84,18 +103,29 @@ fn confidence_of_one_half_is_calibrated_and_confusion_counts_everything() {
     assert_eq!(class.confusion.iter().flatten().sum::<usize>(), 4000);
     let right = (class.confusion[0][0] + class.confusion[1][1]) as f64 / 4000.0;
     assert!((class.accuracy - right).abs() < 1e-12);
-    assert!(honest.obstacle_after_contact_accuracy.is_some_and(|accuracy| (accuracy - 0.5).abs() < 0.08));
-    assert!(honest.shape_accuracy.is_some());
+    assert!(honest.shape_accuracy.is_some() && honest.no_obstacle_accuracy.is_some());
+    assert_eq!(honest.obstacle_contact_episodes, 667);
+    assert_eq!(class.last_confusion.iter().flatten().sum::<usize>(), 2000);
+}
+
+#[test]
+fn an_obstacle_counts_as_found_where_it_is_likelier_than_not() {
+    for (shift, found, denied) in [(1.0, 1.0, 0.0), (-1.0, 0.0, 1.0)] {
+        let report = shifted_report(60, 1.0, shift);
+        assert_eq!((report.obstacle_after_contact_accuracy, report.no_obstacle_accuracy), (Some(found), Some(denied)));
+    }
 }
 
 #[test]
 fn baseline_of_a_constant_has_the_spread_that_the_network_can_state_at_least() {
     let layout = layout(1, 1, &[2]);
-    let (observations, targets, mask) = (vec![0.0; 3], vec![7.0; 3], vec![1.0; 3]);
-    let sequence = Sequence { observations, targets, mask, classes: vec![0, 0, 1], steps: 3 };
+    let (observations, targets, mask) = (vec![0.0; 41], vec![7.0; 41], vec![1.0; 41]);
+    let classes = [vec![0; 40], vec![1]].concat();
+    let sequence = Sequence { observations, targets, mask, classes, steps: 41 };
     let baseline = Baseline::fit(&layout, &Normalisation::fit(&layout, &[&sequence]), &[&sequence]);
-    assert_eq!(baseline.continuous[0], Scale { mean: 7.0, stddev: (-5.0_f64).exp() });
-    let exact = 5.0 - HALF_LOG_TAU + 0.6_f64.ln();
+    assert_eq!(baseline.continuous[0], [Scale { mean: 7.0, stddev: (-5.0_f64).exp() }]);
+    assert_eq!(baseline.continuous[1], [Scale { mean: 7.0, stddev: 1.0 }], "one row has no spread of its own");
+    let exact = 5.0 - HALF_LOG_TAU + (41.0_f64 / 43.0).ln();
     let log_density = baseline.log_density(&[7.0], &[true], &[0]);
     assert!((log_density - exact).abs() < 1e-12, "counts start from one a label: {log_density} {exact}");
 }

@@ -82,6 +82,20 @@ impl<T: Real> Row<T> {
         HALF_LOG_TAU * applying - log_sum_exp(&self.joint)
     }
 
+    /// Of the [`Row::loss`] call before: adds to each target its squared standardised errors and their number, both weighted by the
+    /// components' responsibilities.
+    pub(crate) fn add_moments(&mut self, sizes: &Dimensions, mask: &[T], squares: &mut [f64], counts: &mut [f64]) {
+        softmax(&self.joint, &mut self.share);
+        for (component, share) in self.share.iter().enumerate() {
+            let at = component * sizes.continuous..(component + 1) * sizes.continuous;
+            for (index, (standard, mask)) in self.standard[at].iter().zip(mask).enumerate() {
+                let weight = share.to_f64() * mask.to_f64();
+                squares[index] += weight * standard.to_f64() * standard.to_f64();
+                counts[index] += weight;
+            }
+        }
+    }
+
     /// Replaces `outputs` by `scale` times the gradient of the loss of the [`Row::loss`] call before.
     pub(crate) fn gradient(&mut self, sizes: &Dimensions, outputs: &mut [T], mask: &[T], classes: &[u8], scale: T) {
         let (k, d, labels) = (sizes.components, sizes.continuous, sizes.labels());

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Version of `training.json`.
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// File that makes a folder a training state.
 const FILE: &str = "training.json";

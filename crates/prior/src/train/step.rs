@@ -36,16 +36,22 @@ impl Trainer {
             gradient.tensors.iter_mut().flatten().for_each(|value| *value *= factor);
         }
         let gradients = Network::register(gradient, &self.dimensions, &device());
-        self.network = self.optimizer.step(self.config.learning_rate, self.network.clone(), gradients);
+        self.network = self.optimizer.step(self.learning_rate(), self.network.clone(), gradients);
         self.parameters = self.network.parameters();
         self.steps += 1;
         Ok(Done { loss, transitions, norm })
     }
 
+    fn learning_rate(&self) -> f64 {
+        self.config.learning_rate * self.config.schedule.share(self.curve.len() + 1, self.config.max_epochs)
+    }
+
     /// Deals the batch into a fixed number of chunks, so that the sums do not depend on the number of threads.
     fn fused_gradient(&mut self, indices: &[usize], transitions: usize) -> (f64, Parameters<f32>) {
         let (sizes, parameters, chunks) = (&self.dimensions, &self.parameters, self.config.chunks);
-        let mut sequences: Vec<&Sequence> = indices.iter().map(|&index| &self.training[index]).collect();
+        let chosen: Vec<&Sequence> = indices.iter().map(|&index| &self.training[index]).collect();
+        let alone = alone(self.config.network.memory, &chosen);
+        let mut sequences = alone.as_ref().map_or(chosen, |alone| alone.iter().collect());
         sequences.sort_by_key(|sequence| std::cmp::Reverse(sequence.steps));
         let (seed, steps, dropout) = (self.seed, self.steps, self.config.dropout);
         let scale = 1.0 / transitions as f32;
@@ -65,7 +71,9 @@ impl Trainer {
     }
 
     fn autodiff_gradient(&self, indices: &[usize]) -> (f64, Parameters<f32>) {
-        let sequences: Vec<&Sequence> = indices.iter().map(|&index| &self.training[index]).collect();
+        let chosen: Vec<&Sequence> = indices.iter().map(|&index| &self.training[index]).collect();
+        let alone = alone(self.config.network.memory, &chosen);
+        let sequences = alone.as_ref().map_or(chosen, |alone| alone.iter().collect());
         let batch = Padded::new(&sequences, &self.dimensions, &device().autodiff());
         let mut rng = self.seed.stream(Purpose::Regularisation, self.steps);
         let factors = dropout_factors(self.config.dropout, &self.dimensions, batch.steps(), &mut rng);
@@ -73,6 +81,11 @@ impl Trainer {
         let gradient = self.network.gradients(&loss.backward());
         (f64::from(loss.into_scalar::<f32>()) * batch.steps() as f64, gradient)
     }
+}
+
+/// Without memory the steps of `sequences`, each a sequence of its own.
+pub(super) fn alone(memory: bool, sequences: &[&Sequence]) -> Option<Vec<Sequence>> {
+    (!memory).then(|| sequences.iter().flat_map(|sequence| sequence.single_steps()).collect())
 }
 
 /// Σ of the gradients in the order of the chunks.

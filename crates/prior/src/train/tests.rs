@@ -10,8 +10,9 @@ fn normal(rng: &mut Rng) -> f32 {
 
 fn config(hidden: &[usize], components: usize) -> TrainConfig {
     TrainConfig {
-        network: NetworkConfig { hidden: hidden.to_vec(), components },
+        network: NetworkConfig { hidden: hidden.to_vec(), components, memory: true },
         learning_rate: 0.01,
+        schedule: Schedule::Constant,
         batch: 32,
         chunks: 3,
         held_out: 0.2,
@@ -20,6 +21,7 @@ fn config(hidden: &[usize], components: usize) -> TrainConfig {
         clip_norm: Some(5.0),
         weight_decay: 0.0,
         dropout: 0.0,
+        rescale: false,
         gradient: GradientPath::Fused,
     }
 }

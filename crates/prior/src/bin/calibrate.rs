@@ -1,0 +1,158 @@
+//! `cargo xtask calibrate`: compares what a prior says on held-out episodes with what was true.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, anyhow};
+use clap::Parser;
+use dataset::Reader;
+use prior::calibrate::{Calibration, calibrate};
+use prior::features::{self, ActionInput};
+use prior::{Checkpoint, Episode, Models, Sequence, write_atomically};
+
+/// Compares what a prior says with the truth of episodes that it was not trained on.
+#[derive(Debug, Parser)]
+#[command(name = "calibrate", version)]
+struct Arguments {
+    /// Arm: sawyer or jaco.
+    #[arg(long, default_value = "sawyer")]
+    robot: String,
+    /// Folder of the prior [default: assets/priors/ROBOT].
+    #[arg(long)]
+    prior: Option<PathBuf>,
+    /// Folder of a dataset made with another seed than the training data [default: runs/held-out/ROBOT].
+    #[arg(long)]
+    data: Option<PathBuf>,
+    /// Folder of a prior trained with `train --memoryless` on the same data: a second baseline.
+    #[arg(long)]
+    memoryless: Option<PathBuf>,
+    /// Folder of the report [default: the prior's].
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Worker threads [default: all cores]; the report does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Prints the report as one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Project folder [default: the current one].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let root = match &arguments.root {
+        Some(root) => root.clone(),
+        None => prior::project_root(&std::env::current_dir()?),
+    };
+    let robot = &arguments.robot;
+    let folder = arguments.prior.clone().unwrap_or_else(|| root.join("assets/priors").join(robot));
+    let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(robot));
+    let out = arguments.out.clone().unwrap_or_else(|| folder.clone());
+    rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
+
+    let checkpoint = Checkpoint::load(&folder, None)?;
+    let reader = Reader::open(&data).with_context(|| {
+        format!(
+            "{}: no usable dataset, make one with `cargo xtask datagen --robot {robot} --seed 2 --out {0}`",
+            data.display()
+        )
+    })?;
+    let manifest = reader.manifest();
+    let layout = features::layout_of_dataset(&manifest.schema, ActionInput::of(&checkpoint.layout));
+    checkpoint.layout.check(&layout, &folder.join("prior.json"))?;
+    if checkpoint.provenance.get("dataset_seed") == Some(&manifest.seed.to_string()) {
+        return Err(anyhow!(
+            "{}: seed is {}, that of the data the prior was trained on, expected another: its worlds are not held out",
+            data.join("meta/info.json").display(),
+            manifest.seed
+        ));
+    }
+    let memoryless = match &arguments.memoryless {
+        Some(folder) => {
+            let memoryless = Checkpoint::load(folder, Some(&layout))?;
+            if memoryless.network.memory {
+                return Err(anyhow!("{}: network.memory is true, expected false", folder.join("prior.json").display()));
+            }
+            Some(memoryless.inference()?)
+        }
+        None => None,
+    };
+    let recorded = reader.episodes()?;
+    let sequences: Vec<Sequence> = recorded.iter().map(|episode| features::sequence(&layout, episode)).collect();
+    let first = |episode: &dataset::Episode, event| features::first_event(&manifest.schema, episode, event);
+    let episodes: Vec<Episode<'_>> = recorded
+        .iter()
+        .zip(&sequences)
+        .map(|(episode, sequence)| Episode {
+            sequence,
+            contact: first(episode, "tool_touched"),
+            obstacle_touched: first(episode, "obstacle_touched").is_some(),
+        })
+        .collect();
+    let inference = checkpoint.inference()?;
+    let models = Models { network: &inference, baseline: &checkpoint.baseline, memoryless: memoryless.as_ref() };
+    let calibration = calibrate(models, &layout, features::static_columns(&layout), &episodes);
+    let json = serde_json::to_string_pretty(&calibration)? + "\n";
+    write_atomically(&out.join("calibration.json"), json.as_bytes())?;
+    for (name, figure) in prior::pictures::calibration(robot, &calibration) {
+        figure.save(&out.join(name))?;
+    }
+    if arguments.json {
+        println!("{}", serde_json::to_string(&calibration)?);
+    } else {
+        print(&calibration);
+        println!("{}", out.join("calibration.json").display());
+    }
+    Ok(())
+}
+
+fn print(calibration: &Calibration) {
+    let Calibration { episodes, steps, nll, baseline_nll, .. } = calibration;
+    println!(
+        "{episodes} episodes, {steps} steps; nats a step: network {nll:.2}, sampling distribution {baseline_nll:.2}"
+    );
+    if let Some(memoryless) = calibration.memoryless_nll {
+        println!("the same network without memory: {memoryless:.2}");
+    }
+    println!("\n{:<20} {:>8} {:>8} {:>8} {:>8}", "parameter", "episodes", "50 %", "90 %", "±");
+    for parameter in calibration.parameters.iter().filter(|p| calibration.static_targets.contains(&p.name)) {
+        println!(
+            "{:<20} {:>8} {:>8.3} {:>8.3} {:>8.3}",
+            parameter.name, parameter.episodes, parameter.coverage50, parameter.coverage90, parameter.coverage90_stderr
+        );
+    }
+    println!();
+    for class in &calibration.classes {
+        println!(
+            "{}: right at the last step in {:.3}, expected calibration error {:.3}, confusion {:?}",
+            class.name, class.last_accuracy, class.expected_calibration_error, class.last_confusion
+        );
+    }
+    if let Some(found) = calibration.obstacle_after_contact_accuracy {
+        let touched = calibration.obstacle_contact_episodes;
+        let denied = calibration.no_obstacle_accuracy.unwrap_or(f64::NAN);
+        println!(
+            "obstacle found in {found:.3} of {touched} episodes that touched it, denied in {denied:.3} without one"
+        );
+    }
+    println!("\nsteps since the first contact, nats of Θ: network, sampling distribution, without memory");
+    for report in calibration.sharpening.iter().filter(|r| r.since_contact.count > 0) {
+        let score = &report.since_contact;
+        let memoryless = score.static_nll.memoryless.map_or(String::new(), |nll| format!("{nll:>8.2}"));
+        println!(
+            "{:>4} {:>7} {:>8.2} {:>8.2} {memoryless}",
+            report.step, score.count, score.static_nll.network, score.static_nll.baseline
+        );
+    }
+}

@@ -1,0 +1,84 @@
+//! What is known without any observation: the distribution that the training worlds are drawn from.
+
+use serde::{Deserialize, Serialize};
+
+use crate::fused::{HALF_LOG_TAU, LOG_STDDEV_LIMITS};
+use crate::normalise::{Normalisation, Scale};
+use crate::{Layout, Sequence};
+
+/// Fewer rows of a structure than this say nothing of its spread: the marginal over all structures is taken.
+const ENOUGH_ROWS: f64 = 30.0;
+
+/// The sampling distribution as the training data show it: frequencies of the structures (joint labels of all class targets) and,
+/// given the structure, independent Gaussians of the continuous targets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Baseline {
+    /// Number of labels of each class target; a structure's index has the last target's label as its lowest digit.
+    pub labels: Vec<usize>,
+    /// Frequency of each structure.
+    pub structures: Vec<f64>,
+    /// Gaussian of each continuous target where it applies, `[structures][continuous]`.
+    pub continuous: Vec<Vec<Scale>>,
+}
+
+impl Baseline {
+    /// Fitted on `sequences`; the spread of a constant has the same floor as the network's, frequencies start from one count.
+    #[must_use]
+    pub fn fit(layout: &Layout, normalisation: &Normalisation, sequences: &[&Sequence]) -> Self {
+        let (width, kinds) = (layout.continuous.len(), layout.classes.len());
+        let labels: Vec<usize> = layout.classes.iter().map(|target| target.labels.len()).collect();
+        let structures = labels.iter().product();
+        // Count, mean and sum of squares of each structure's columns, by Welford's recurrence.
+        let mut moments = vec![vec![(0.0, 0.0, 0.0); width]; structures];
+        let mut counts = vec![1.0; structures];
+        for sequence in sequences {
+            for step in 0..sequence.steps {
+                let structure = index(&labels, &sequence.classes[step * kinds..(step + 1) * kinds]);
+                counts[structure] += 1.0;
+                for column in 0..width {
+                    if sequence.mask[step * width + column] == 1.0 {
+                        let value = f64::from(sequence.targets[step * width + column]);
+                        let (count, mean, squares) = &mut moments[structure][column];
+                        *count += 1.0;
+                        let delta = value - *mean;
+                        *mean += delta / *count;
+                        *squares += delta * (value - *mean);
+                    }
+                }
+            }
+        }
+        let scale = |(count, mean, squares): (f64, f64, f64), all: &Scale| {
+            if count < ENOUGH_ROWS {
+                return *all;
+            }
+            Scale { mean, stddev: f64::sqrt(squares / count).max(all.stddev * LOG_STDDEV_LIMITS.0.exp()) }
+        };
+        let total: f64 = counts.iter().sum();
+        let continuous = moments.into_iter().map(|columns| {
+            columns.into_iter().zip(&normalisation.continuous).map(|(moments, all)| scale(moments, all)).collect()
+        });
+        Self {
+            continuous: continuous.collect(),
+            structures: counts.iter().map(|count| count / total).collect(),
+            labels,
+        }
+    }
+
+    /// ln p(values, classes); values whose mask is false do not count.
+    #[must_use]
+    pub fn log_density(&self, values: &[f64], mask: &[bool], classes: &[u8]) -> f64 {
+        let structure = index(&self.labels, classes);
+        let gaussians = values.iter().zip(mask).zip(&self.continuous[structure]).filter(|((_, applies), _)| **applies);
+        let gaussians = gaussians.map(|((value, _), scale)| {
+            let standard = (value - scale.mean) / scale.stddev;
+            -0.5 * standard * standard - scale.stddev.ln() - HALF_LOG_TAU
+        });
+        gaussians.sum::<f64>() + self.structures[structure].ln()
+    }
+}
+
+/// Index of a structure.
+fn index(labels: &[usize], classes: &[u8]) -> usize {
+    labels.iter().zip(classes).fold(0, |index, (count, &class)| index * count + usize::from(class))
+}
