@@ -56,7 +56,7 @@ impl<T: Real> Workspace<T> {
     #[must_use]
     pub fn loss(&mut self, parameters: &Parameters<T>, batch: &Batch<T>) -> f64 {
         self.forward(parameters, batch, None);
-        self.rows(batch, None)
+        rows(&self.dimensions, &mut self.row, &mut self.outputs, batch, None)
     }
 
     /// Sums over the rows of `batch`, `[continuous]` each: squared standardised errors of the targets that apply and their number, the
@@ -86,7 +86,7 @@ impl<T: Real> Workspace<T> {
         scale: T,
     ) -> f64 {
         self.forward(parameters, batch, dropout);
-        let loss = self.rows(batch, Some(scale));
+        let loss = rows(&self.dimensions, &mut self.row, &mut self.outputs, batch, Some(scale));
         self.backward(parameters, batch, dropout);
         loss
     }
@@ -121,23 +121,6 @@ impl<T: Real> Workspace<T> {
             product(target, stride, true, hidden, Matrix::dense(weight, width, outputs));
             first += outputs;
         }
-    }
-
-    /// Loss of every row; with `scale`, output rows are replaced by their gradients.
-    fn rows(&mut self, batch: &Batch<T>, scale: Option<T>) -> f64 {
-        let sizes = &self.dimensions;
-        let (targets, kinds) = (sizes.continuous, sizes.classes.len());
-        let mut total = 0.0;
-        for (index, outputs) in self.outputs.chunks_exact_mut(sizes.outputs()).take(batch.rows).enumerate() {
-            let at = index * targets..(index + 1) * targets;
-            let (target, mask) = (&batch.targets[at.clone()], &batch.mask[at]);
-            let classes = &batch.classes[index * kinds..(index + 1) * kinds];
-            total += self.row.loss(sizes, outputs, target, mask, classes);
-            if let Some(scale) = scale {
-                self.row.gradient(sizes, outputs, mask, classes, scale);
-            }
-        }
-        total
     }
 
     fn backward(&mut self, parameters: &Parameters<T>, batch: &Batch<T>, dropout: Option<&Dropout<T>>) {
@@ -178,4 +161,22 @@ impl<T: Real> Workspace<T> {
             current[0].backward(batch, inputs, weights, gradients, upstream, target);
         }
     }
+}
+
+wide! {
+/// Loss of every row; with `scale`, output rows are replaced by their gradients.
+fn rows<T>(sizes: &Dimensions, row: &mut head::Row<T>, outputs: &mut [T], batch: &Batch<T>, scale: Option<T>) -> f64 {
+    let (targets, kinds) = (sizes.continuous, sizes.classes.len());
+    let mut total = 0.0;
+    for (index, outputs) in outputs.chunks_exact_mut(sizes.outputs()).take(batch.rows).enumerate() {
+        let at = index * targets..(index + 1) * targets;
+        let (target, mask) = (&batch.targets[at.clone()], &batch.mask[at]);
+        let classes = &batch.classes[index * kinds..(index + 1) * kinds];
+        total += row.loss(sizes, outputs, target, mask, classes);
+        if let Some(scale) = scale {
+            row.gradient(sizes, outputs, mask, classes, scale);
+        }
+    }
+    total
+}
 }

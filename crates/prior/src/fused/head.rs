@@ -47,6 +47,7 @@ impl<T: Real> Row<T> {
     ///
     /// - `outputs`: `[components | components × continuous | components × continuous | components × labels]`
     /// - `targets`, `mask`: `[continuous]`; `classes`: `[class targets]`
+    #[inline(always)]
     pub(crate) fn loss(&mut self, sizes: &Dimensions, outputs: &[T], targets: &[T], mask: &[T], classes: &[u8]) -> f64 {
         let (k, d, labels) = (sizes.components, sizes.continuous, sizes.labels());
         let (logits, rest) = outputs.split_at(k);
@@ -54,21 +55,23 @@ impl<T: Real> Row<T> {
         let (log_stddevs, labelled) = rest.split_at(k * d);
         let (low, high) = (T::from_f64(LOG_STDDEV_LIMITS.0), T::from_f64(LOG_STDDEV_LIMITS.1));
         let half = T::from_f64(0.5);
+        // Slices of length d, so that the compiler sees that no index leaves them, and vectorises.
+        let (targets, mask, terms) = (&targets[..d], &mask[..d], &mut self.terms[..d]);
         softmax(logits, &mut self.share);
         let normaliser = log_sum_exp(logits);
         for component in 0..k {
             let at = component * d..(component + 1) * d;
-            let (means, log_stddevs) = (&means[at.clone()], &log_stddevs[at.clone()]);
-            let (standard, inverse) = (&mut self.standard[at.clone()], &mut self.inverse[at]);
+            let (means, log_stddevs) = (&means[at.clone()][..d], &log_stddevs[at.clone()][..d]);
+            let (standard, inverse) = (&mut self.standard[at.clone()][..d], &mut self.inverse[at][..d]);
             for (inverse, &log_stddev) in inverse.iter_mut().zip(log_stddevs) {
                 *inverse = (-log_stddev.limit(low, high)).exp();
             }
             for index in 0..d {
                 standard[index] = (targets[index] - means[index]) * inverse[index];
                 let log_stddev = log_stddevs[index].limit(low, high);
-                self.terms[index] = -mask[index] * (half * standard[index] * standard[index] + log_stddev);
+                terms[index] = -mask[index] * (half * standard[index] * standard[index] + log_stddev);
             }
-            let mut joint = logits[component].to_f64() - normaliser + sum(&self.terms).to_f64();
+            let mut joint = logits[component].to_f64() - normaliser + sum(terms).to_f64();
             let mut first = component * labels;
             for (&count, &class) in sizes.classes.iter().zip(classes) {
                 let logits = &labelled[first..first + count];
@@ -97,20 +100,22 @@ impl<T: Real> Row<T> {
     }
 
     /// Replaces `outputs` by `scale` times the gradient of the loss of the [`Row::loss`] call before.
+    #[inline(always)]
     pub(crate) fn gradient(&mut self, sizes: &Dimensions, outputs: &mut [T], mask: &[T], classes: &[u8], scale: T) {
         let (k, d, labels) = (sizes.components, sizes.continuous, sizes.labels());
         let (logits, rest) = outputs.split_at_mut(k);
         let (means, rest) = rest.split_at_mut(k * d);
         let (log_stddevs, labelled) = rest.split_at_mut(k * d);
         let (low, high) = (T::from_f64(LOG_STDDEV_LIMITS.0), T::from_f64(LOG_STDDEV_LIMITS.1));
+        let mask = &mask[..d];
         // Logits become the responsibilities p(k | targets, classes), then the gradient.
         softmax(&self.joint, logits);
         for (component, logit) in logits.iter_mut().enumerate() {
             let responsibility = (scale * *logit).flush();
             *logit = scale * self.share[component] - responsibility;
             let at = component * d..(component + 1) * d;
-            let (means, log_stddevs) = (&mut means[at.clone()], &mut log_stddevs[at.clone()]);
-            let (standard, inverse) = (&self.standard[at.clone()], &self.inverse[at]);
+            let (means, log_stddevs) = (&mut means[at.clone()][..d], &mut log_stddevs[at.clone()][..d]);
+            let (standard, inverse) = (&self.standard[at.clone()][..d], &self.inverse[at][..d]);
             for index in 0..d {
                 let weight = responsibility * mask[index];
                 let standard = standard[index];
@@ -148,6 +153,7 @@ fn sum<T: Real>(values: &[T]) -> T {
 }
 
 /// ln Σ exp, safe for any finite values.
+#[inline(always)]
 fn log_sum_exp<T: Real>(values: &[T]) -> f64 {
     let largest = values.iter().fold(f64::NEG_INFINITY, |largest, value| largest.max(value.to_f64()));
     largest + values.iter().map(|value| (value.to_f64() - largest).exp()).sum::<f64>().ln()

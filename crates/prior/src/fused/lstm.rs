@@ -3,7 +3,7 @@
 //! With gates (i, f, g, o) = (σ, σ, tanh, σ)(x W + h′ R + b), where ′ marks the step before:
 //! c = f c′ + i g, h = o tanh c.
 
-use super::real::{Matrix, Real, add_column_sums, product};
+use super::real::{Matrix, Real, add_column_sums, product, wide};
 use crate::fused::Batch;
 
 /// What a layer keeps between the passes, reused from batch to batch.
@@ -25,6 +25,8 @@ pub(crate) struct Layer<T> {
     /// Gradients of h and c that flow to the step before, `[active, width]`.
     hidden_gradient: Vec<T>,
     cell_gradient: Vec<T>,
+    /// Recurrent weights transposed, `[4 width, width]`: the product of every step would pack them anew.
+    transposed: Vec<T>,
 }
 
 impl<T: Real> Layer<T> {
@@ -96,6 +98,10 @@ impl<T: Real> Layer<T> {
         self.hidden_gradient.resize(widest, T::ZERO);
         self.cell_gradient.clear();
         self.cell_gradient.resize(widest, T::ZERO);
+        self.transposed.clear();
+        for column in 0..4 * width {
+            self.transposed.extend(recurrent.iter().skip(column).step_by(4 * width));
+        }
         for step in (0..batch.active.len()).rev() {
             let (offset, alive) = (batch.offsets[step], batch.active[step]);
             let upstream = &mut upstream[offset * width..(offset + alive) * width];
@@ -110,7 +116,7 @@ impl<T: Real> Layer<T> {
             deactivate(width, gates, past_cell, squashed, upstream, &mut self.cell_gradient[..alive * width]);
             if step > 0 {
                 let gates = Matrix::dense(&*gates, alive, 4 * width);
-                let back = Matrix::dense(recurrent, width, 4 * width).transposed();
+                let back = Matrix::dense(&self.transposed, 4 * width, width);
                 product(&mut self.hidden_gradient, width, false, gates, back);
             }
         }
@@ -130,8 +136,9 @@ impl<T: Real> Layer<T> {
     }
 }
 
+wide! {
 /// Gates from their sums, then cell and hidden state; all `[alive, …]`.
-fn activate<T: Real>(
+fn activate<T>(
     width: usize,
     gates: &mut [T],
     past_cell: Option<&[T]>,
@@ -165,10 +172,12 @@ fn activate<T: Real>(
         }
     }
 }
+}
 
+wide! {
 /// Gradients of the gates before activation (in place of the gates), and of the cell one step earlier (in place of
 /// `cell_gradient`, which holds what flows back from the step after); all `[alive, …]`.
-fn deactivate<T: Real>(
+fn deactivate<T>(
     width: usize,
     gates: &mut [T],
     past_cell: Option<&[T]>,
@@ -200,4 +209,5 @@ fn deactivate<T: Real>(
             None => forget.fill(T::ZERO),
         }
     }
+}
 }

@@ -2,13 +2,13 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// Defines a function that is compiled twice, for the baseline and for AVX2, and picks at run time.
+/// Defines a function that is compiled for the baseline, for AVX2 and for AVX-512, and picks at run time.
 ///
-/// The bodies are element by element without fused multiply-add, so both give the same bits.
+/// The bodies are element by element without fused multiply-add, so all give the same bits.
 macro_rules! wide {
-    ($(#[$meta:meta])* fn $name:ident $(<$t:ident>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+    ($(#[$meta:meta])* $vis:vis fn $name:ident $(<$t:ident>)? ($($arg:ident: $ty:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
         $(#[$meta])*
-        fn $name $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? {
+        $vis fn $name $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? {
             #[inline(always)]
             fn body $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? $body
             #[cfg(target_arch = "x86_64")]
@@ -16,6 +16,19 @@ macro_rules! wide {
                 #[target_feature(enable = "avx2")]
                 fn avx2 $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? {
                     body($($arg),*)
+                }
+                #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
+                fn avx512 $(<$t: $crate::fused::Real>)? ($($arg: $ty),*) $(-> $out)? {
+                    body($($arg),*)
+                }
+                if std::arch::is_x86_feature_detected!("avx512f")
+                    && std::arch::is_x86_feature_detected!("avx512bw")
+                    && std::arch::is_x86_feature_detected!("avx512dq")
+                    && std::arch::is_x86_feature_detected!("avx512vl")
+                {
+                    #[expect(unsafe_code, reason = "the only condition, that the CPU has these units, was just tested")]
+                    // SAFETY: the CPU has these units.
+                    return unsafe { avx512($($arg),*) };
                 }
                 if std::arch::is_x86_feature_detected!("avx2") {
                     #[expect(unsafe_code, reason = "the only condition, that the CPU has AVX2, was just tested")]
@@ -69,6 +82,7 @@ pub trait Real:
     fn limit(self, low: Self, high: Self) -> Self;
     /// 0 where the magnitude is below 1e-25, else the value. Subnormal factors make a processor's multiplication a hundred times slower;
     /// gradients so small change nothing.
+    #[inline(always)]
     fn flush(self) -> Self {
         let tiny = Self::from_f64(1e-25);
         if self < tiny && -self < tiny { Self::ZERO } else { self }
@@ -240,14 +254,16 @@ pub(crate) fn product<T: Real>(
     }
 }
 
+wide! {
 /// `target += Σ rows` of a row-major matrix whose rows are `stride` apart.
-pub(crate) fn add_column_sums<T: Real>(target: &mut [T], data: &[T], rows: usize, stride: usize) {
+pub(crate) fn add_column_sums<T>(target: &mut [T], data: &[T], rows: usize, stride: usize) {
     let width = target.len();
     for row in data.chunks(stride).take(rows) {
         for (sum, &value) in target.iter_mut().zip(&row[..width]) {
             *sum += value;
         }
     }
+}
 }
 
 #[cfg(test)]
@@ -265,6 +281,23 @@ mod tests {
             let exact = 1.0 / (1.0 + (-f64::from(x)).exp());
             assert!((f64::from(Real::sigmoid(x)) - exact).abs() < 2e-7, "sigmoid {x}");
         }
+    }
+
+    wide! {
+    fn widened(values: &mut [f32]) {
+        for value in values {
+            *value = (Real::exp(*value) * value.sigmoid() + Real::tanh(*value) * *value - 0.3).flush();
+        }
+    }
+    }
+
+    #[test]
+    fn vector_units_change_no_bit() {
+        let mut values: Vec<f32> = (-50_000..=50_000).map(|i| i as f32 * 7e-4).collect();
+        let expected: Vec<u32> =
+            values.iter().map(|&x| (Real::exp(x) * x.sigmoid() + Real::tanh(x) * x - 0.3).flush().to_bits()).collect();
+        widened(&mut values);
+        assert!(values.iter().map(|value| value.to_bits()).eq(expected));
     }
 
     #[test]
