@@ -3,7 +3,7 @@
 use crate::checkpoint::Checkpoint;
 use crate::fused::{LOG_STDDEV_LIMITS, Real, wide};
 use crate::mixture::Mixture;
-use crate::normalise::{Normalisation, normalise_observation};
+use crate::normalise::{Normalisation, Scale, normalise_observation};
 use crate::parameters::{Dimensions, Parameters};
 use crate::{Error, Layout};
 use std::path::Path;
@@ -19,23 +19,40 @@ pub struct Inference {
     cells: Vec<Vec<f32>>,
     /// Input of each layer followed by its hidden state, `[inputs + width]`.
     states: Vec<Vec<f32>>,
-    /// Gates of the widest layer.
+    /// Gates of the widest layer, up to a whole tile.
     gates: Vec<f32>,
     /// Last hidden state.
     top: Vec<f32>,
-    /// Raw outputs of the heads.
+    /// Raw outputs of the heads, up to a whole tile.
     outputs: Vec<f32>,
     mixture: Mixture,
+}
+
+/// Columns whose sums stay in registers while a step runs down the rows of a matrix.
+const TILE: usize = 64;
+
+/// One row of a tile, at the start of a cache line: vectors that straddle two lines load at half the speed.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct TileRow([f32; TILE]);
+
+/// A row-major `[rows, width]` matrix cut into tiles of [`TILE`] columns (zeros beyond the last), one after the other: the order in which a step
+/// reads it.
+fn tiles(matrix: &[f32], width: usize) -> Vec<TileRow> {
+    let firsts = (0..width).step_by(TILE);
+    let rows =
+        firsts.flat_map(|first| matrix.chunks_exact(width).map(move |row| &row[first..(first + TILE).min(width)]));
+    rows.map(|row| TileRow(std::array::from_fn(|column| row.get(column).copied().unwrap_or(0.0)))).collect()
 }
 
 #[derive(Debug)]
 struct Weights {
     dimensions: Dimensions,
     normalisation: Normalisation,
-    /// Input weights above recurrent weights, `[inputs + width, 4 width]`, and bias `[4 width]`, per layer.
-    layers: Vec<(Vec<f32>, Vec<f32>)>,
-    /// All heads side by side: `[width, outputs]` and `[outputs]`.
-    heads: (Vec<f32>, Vec<f32>),
+    /// Input weights above recurrent weights, `[inputs + width, 4 width]` in tiles, and bias `[4 width]`, per layer.
+    layers: Vec<(Vec<TileRow>, Vec<f32>)>,
+    /// All heads side by side: `[width, outputs]` in tiles and `[outputs]`.
+    heads: (Vec<TileRow>, Vec<f32>),
 }
 
 impl Inference {
@@ -54,7 +71,8 @@ impl Inference {
         let (sizes, count) = (dimensions, dimensions.hidden.len());
         let layers = (0..count)
             .map(|layer| {
-                ([parameters.input(layer), parameters.recurrent(layer)].concat(), parameters.bias(layer).to_vec())
+                let matrix = [parameters.input(layer), parameters.recurrent(layer)].concat();
+                (tiles(&matrix, 4 * sizes.hidden[layer]), parameters.bias(layer).to_vec())
             })
             .collect();
         let heads = sizes.heads();
@@ -70,15 +88,15 @@ impl Inference {
             memory: true,
             cells: sizes.hidden.iter().map(|&width| vec![0.0; width]).collect(),
             states: states.collect(),
-            gates: vec![0.0; 4 * sizes.hidden.iter().max().copied().unwrap_or(0)],
+            gates: vec![0.0; (4 * sizes.hidden.iter().max().copied().unwrap_or(0)).next_multiple_of(TILE)],
             top: vec![0.0; sizes.top()],
-            outputs: vec![0.0; sizes.outputs()],
+            outputs: vec![0.0; sizes.outputs().next_multiple_of(TILE)],
             mixture: Mixture::blank(sizes.components, sizes.continuous, sizes.classes.clone()),
             weights: Arc::new(Weights {
                 dimensions: sizes.clone(),
                 normalisation: normalisation.clone(),
                 layers,
-                heads: (weight, bias),
+                heads: (tiles(&weight, sizes.outputs()), bias),
             }),
         }
     }
@@ -118,10 +136,10 @@ impl Inference {
         }
         for (layer, (matrix, bias)) in weights.layers.iter().enumerate() {
             let (width, inputs) = (weights.dimensions.hidden[layer], weights.dimensions.layer_inputs(layer));
-            let gates = &mut self.gates[..4 * width];
-            gates.copy_from_slice(bias);
+            let gates = &mut self.gates[..(4 * width).next_multiple_of(TILE)];
+            gates[..4 * width].copy_from_slice(bias);
             accumulate(gates, matrix, &self.states[layer]);
-            activate(gates, &mut self.cells[layer], &mut self.states[layer][inputs..]);
+            activate(&mut gates[..4 * width], &mut self.cells[layer], &mut self.states[layer][inputs..]);
             let (done, next) = self.states.split_at_mut(layer + 1);
             let hidden = &done[layer][inputs..];
             match next.first_mut() {
@@ -129,7 +147,7 @@ impl Inference {
                 None => self.top.copy_from_slice(hidden),
             }
         }
-        self.outputs.copy_from_slice(&weights.heads.1);
+        self.outputs[..weights.heads.1.len()].copy_from_slice(&weights.heads.1);
         accumulate(&mut self.outputs, &weights.heads.0, &self.top);
         self.read_outputs();
         &self.mixture
@@ -138,7 +156,7 @@ impl Inference {
     /// Raw outputs of the last step in normalised units, in the order of [`Dimensions::heads`].
     #[must_use]
     pub fn raw_outputs(&self) -> &[f32] {
-        &self.outputs
+        &self.outputs[..self.weights.heads.1.len()]
     }
 
     fn read_outputs(&mut self) {
@@ -152,16 +170,10 @@ impl Inference {
             *weight = log.exp();
         }
         let scales = &self.weights.normalisation.continuous;
-        let (low, high) = (LOG_STDDEV_LIMITS.0 as f32, LOG_STDDEV_LIMITS.1 as f32);
         for component in 0..k {
             let at = component * d..(component + 1) * d;
-            for ((target, &mean), scale) in mixture.means[at.clone()].iter_mut().zip(&means[at.clone()]).zip(scales) {
-                *target = f64::from(mean) * scale.stddev + scale.mean;
-            }
-            let stddevs = mixture.stddevs[at.clone()].iter_mut().zip(&log_stddevs[at]);
-            for ((target, &log_stddev), scale) in stddevs.zip(scales) {
-                *target = f64::from(Real::exp(log_stddev.limit(low, high))) * scale.stddev;
-            }
+            let targets = (&mut mixture.means[at.clone()], &mut mixture.stddevs[at.clone()]);
+            gaussians(targets, &means[at.clone()], &log_stddevs[at], scales);
         }
         let mut first = 0;
         for _ in 0..k {
@@ -174,23 +186,16 @@ impl Inference {
 }
 
 wide! {
-/// `target += vector · matrix` for a row-major `[vector, target]` matrix.
-fn accumulate(target: &mut [f32], matrix: &[f32], vector: &[f32]) {
-    let width = target.len();
-    let (blocks, scalars) = (matrix.chunks_exact(4 * width), vector.chunks_exact(4));
-    for (&value, row) in scalars.remainder().iter().zip(blocks.remainder().chunks_exact(width)) {
-        for (target, &weight) in target.iter_mut().zip(row) {
-            *target += value * weight;
+/// `target += vector · matrix` for a matrix laid out by [`tiles`]; `target` is as long as all tiles are wide.
+fn accumulate(target: &mut [f32], tiles: &[TileRow], vector: &[f32]) {
+    for (target, tile) in target.chunks_exact_mut(TILE).zip(tiles.chunks_exact(vector.len())) {
+        let mut sums = [0.0_f32; TILE];
+        for (row, &value) in tile.iter().zip(vector) {
+            for (sum, &weight) in sums.iter_mut().zip(&row.0) {
+                *sum += value * weight;
+            }
         }
-    }
-    for (rows, values) in blocks.zip(scalars) {
-        let (first, rest) = rows.split_at(width);
-        let (second, rest) = rest.split_at(width);
-        let (third, fourth) = rest.split_at(width);
-        for index in 0..width {
-            target[index] += (values[0] * first[index] + values[1] * second[index])
-                + (values[2] * third[index] + values[3] * fourth[index]);
-        }
+        target.iter_mut().zip(sums).for_each(|(target, sum)| *target += sum);
     }
 }
 }
@@ -212,6 +217,19 @@ fn activate(gates: &mut [f32], cell: &mut [f32], hidden: &mut [f32]) {
 }
 }
 
+wide! {
+/// Means and standard deviations of one component in original units.
+fn gaussians(targets: (&mut [f64], &mut [f64]), means: &[f32], log_stddevs: &[f32], scales: &[Scale]) {
+    let (low, high) = (LOG_STDDEV_LIMITS.0 as f32, LOG_STDDEV_LIMITS.1 as f32);
+    for ((target, &mean), scale) in targets.0.iter_mut().zip(means).zip(scales) {
+        *target = f64::from(mean) * scale.stddev + scale.mean;
+    }
+    for ((target, &log_stddev), scale) in targets.1.iter_mut().zip(log_stddevs).zip(scales) {
+        *target = f64::from(Real::exp(log_stddev.limit(low, high))) * scale.stddev;
+    }
+}
+}
+
 /// Logits to ln probabilities.
 fn log_softmax(logits: &[f32], target: &mut [f64]) {
     let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -225,7 +243,6 @@ mod tests {
     use super::*;
     use crate::Sequence;
     use crate::network::{Network, Padded, device};
-    use crate::normalise::Scale;
     use crate::parameters::tests::dimensions;
     use burn::tensor::Tensor;
     use pomdp::{Purpose, Seed};
