@@ -1,8 +1,9 @@
 use super::*;
-use crate::fused::Workspace;
+use crate::fused::{Real, Workspace};
 use crate::parameters::tests::dimensions;
 use pomdp::{Purpose, Rng, Seed};
 use rand::RngExt as _;
+use std::collections::BTreeMap;
 
 fn random_sequence(sizes: &Dimensions, steps: usize, rng: &mut Rng) -> Sequence {
     let mut uniform = |count: usize| (0..count).map(|_| 4.0 * rng.random::<f32>() - 2.0).collect::<Vec<f32>>();
@@ -141,4 +142,92 @@ fn network_returns_the_weights_it_was_made_of() {
     let (sizes, parameters, _, _) = problem(6);
     assert_eq!(Network::new(&parameters, &sizes, &device()).parameters(), parameters);
     assert_eq!(Network::new(&parameters, &sizes, &device().autodiff()).parameters(), parameters);
+}
+
+/// A small network with its loss and gradient in f64, written by PyTorch (tests/peers/pytorch_prior.py --reference).
+#[derive(serde::Deserialize)]
+struct Recorded {
+    sizes: RecordedSizes,
+    sequences: Vec<RecordedSequence>,
+    weights: BTreeMap<String, Vec<f64>>,
+    loss: f64,
+    gradient: BTreeMap<String, Vec<f64>>,
+}
+
+#[derive(serde::Deserialize)]
+struct RecordedSizes {
+    observations: usize,
+    continuous: usize,
+    classes: Vec<usize>,
+    hidden: Vec<usize>,
+    components: usize,
+}
+
+#[derive(serde::Deserialize)]
+struct RecordedSequence {
+    steps: usize,
+    observations: Vec<f32>,
+    targets: Vec<f32>,
+    mask: Vec<f32>,
+    classes: Vec<u8>,
+}
+
+fn recorded() -> (Dimensions, Parameters<f64>, Vec<Sequence>, f64, Parameters<f64>) {
+    let recorded: Recorded = serde_json::from_str(include_str!("../../tests/data/pytorch_reference.json")).unwrap();
+    let RecordedSizes { observations, continuous, classes, hidden, components } = recorded.sizes;
+    let sizes = dimensions(observations, continuous, &classes, &hidden, components);
+    let in_order = |mut named: BTreeMap<String, Vec<f64>>| {
+        let tensors = sizes.tensors().into_iter().map(|spec| {
+            let values = named.remove(&spec.name).unwrap_or_else(|| panic!("{} is not recorded", spec.name));
+            assert_eq!(values.len(), spec.len(), "{}", spec.name);
+            values
+        });
+        let parameters = Parameters { tensors: tensors.collect() };
+        assert!(named.is_empty(), "{:?}", named.keys());
+        parameters
+    };
+    let sequences = recorded.sequences.into_iter().map(|sequence| {
+        let RecordedSequence { steps, observations, targets, mask, classes } = sequence;
+        Sequence { observations, targets, mask, classes, steps }
+    });
+    let sequences = sequences.collect();
+    (sizes.clone(), in_order(recorded.weights), sequences, recorded.loss, in_order(recorded.gradient))
+}
+
+/// Fails unless every value is within `tolerance` times the largest of its tensor.
+fn assert_gradients_agree<T: Real>(
+    ours: &Parameters<T>,
+    reference: &Parameters<f64>,
+    sizes: &Dimensions,
+    tolerance: f64,
+) {
+    for ((ours, reference), spec) in ours.tensors.iter().zip(&reference.tensors).zip(sizes.tensors()) {
+        let largest = reference.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        assert!(largest > 1e-4, "{}: a gradient of zero compares nothing", spec.name);
+        for (index, (ours, reference)) in ours.iter().zip(reference).enumerate() {
+            let difference = (ours.to_f64() - reference).abs();
+            assert!(difference <= tolerance * largest, "{}[{index}]: {} {reference}", spec.name, ours.to_f64());
+        }
+    }
+}
+
+#[test]
+fn fused_loss_and_gradient_are_those_that_pytorch_recorded() {
+    let (sizes, weights, sequences, loss, gradient) = recorded();
+    let batch = Batch::<f64>::pack(&sequences.iter().collect::<Vec<_>>(), &sizes);
+    let mut space = Workspace::new(&sizes);
+    let scale = 1.0 / batch.rows as f64;
+    let ours = scale * space.loss_and_gradient(&weights, &batch, None, scale);
+    assert!((ours / loss - 1.0).abs() < 1e-9, "{ours} {loss}");
+    assert_gradients_agree(&space.gradient, &gradient, &sizes, 1e-9);
+}
+
+#[test]
+fn burns_loss_and_gradient_are_those_that_pytorch_recorded() {
+    let (sizes, weights, sequences, loss, gradient) = recorded();
+    let narrow = weights.map(|value| value as f32);
+    assert_eq!(narrow.map(f64::from), weights, "the recorded weights are exact in f32");
+    let (ours, by_autodiff) = by_autodiff(&sizes, &narrow, &sequences.iter().collect::<Vec<_>>(), None);
+    assert!((ours / loss - 1.0).abs() < 1e-5, "{ours} {loss}");
+    assert_gradients_agree(&by_autodiff, &gradient, &sizes, 1e-5);
 }
