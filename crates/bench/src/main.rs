@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
-use bench::{belief, planner, report};
+use bench::{belief, planner, prior, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
 use serde_json::Value;
@@ -65,6 +65,24 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// Training and inference of the prior, in turn with PyTorch (Python of the variable PYTHON, else python3).
+    Prior {
+        /// Epochs of every program; medians of these are compared.
+        #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
+        rounds: u32,
+        /// Inference steps in a batch.
+        #[arg(long, default_value_t = 5000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+        steps: u32,
+        /// Dataset for whole epochs [default: runs/data/sawyer, else runs/quick/data/sawyer, else none].
+        #[arg(long)]
+        data: Option<PathBuf>,
+        /// Also times PyTorch's compiled step, which needs a C++ compiler and a minute.
+        #[arg(long)]
+        compile: bool,
+        /// Prints one JSON object.
+        #[arg(long)]
+        json: bool,
+    },
     /// Errors against MuJoCo's recorded answers and closed forms: the page in the docs of physics-model.
     Accuracy {
         /// Writes the page into the project.
@@ -119,6 +137,17 @@ fn run(arguments: &Arguments) -> Result<()> {
                 println!("{result}");
             } else {
                 print!("{}", planner::table(&result));
+            }
+        }
+        What::Prior { rounds, steps, data, compile, json } => {
+            let made = ["runs/data/sawyer", "runs/quick/data/sawyer"].map(|folder| root.join(folder));
+            let data = data.clone().or_else(|| made.into_iter().find(|folder| folder.join("meta/info.json").is_file()));
+            let effort = prior::Effort { rounds: *rounds as usize, steps: *steps as usize, data, compile: *compile };
+            let result = prior::run(&root, &effort, |text| eprintln!("{text}"))?;
+            if *json {
+                println!("{result}");
+            } else {
+                print!("{}", prior::table(&result));
             }
         }
         What::Accuracy { write, set } => {

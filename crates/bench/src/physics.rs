@@ -325,7 +325,7 @@ fn transitions(root: &Path, effort: Effort) -> Result<Value> {
 }
 
 /// Name of the processor.
-fn machine() -> String {
+pub(crate) fn machine() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let name = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": ").map(|(_, name)| name));
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
