@@ -212,7 +212,7 @@ class Step(torch.nn.Module):
                 self.cells.append(cell)
 
     def forward(self, observation, hidden, cell):
-        values = ((observation - self.means) / self.stddevs).clamp(-10.0, 10.0)
+        values = torch.asinh((observation - self.means) / self.stddevs)
         if self.cells is None:
             top, (hidden, cell) = self.lstm(values.unsqueeze(0), (hidden, cell))
         else:

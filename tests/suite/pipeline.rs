@@ -97,7 +97,7 @@ fn a_prior_is_the_same_for_one_thread_and_two_and_after_a_kill() {
     };
     let expected = prior_files(&trained().prior);
     let names: Vec<String> = expected.iter().map(|(path, _)| path.display().to_string()).collect();
-    assert!(names.contains(&"prior.json".into()) && names.contains(&"calibration.json".into()), "{names:?}");
+    assert!(names.contains(&"prior.json".into()) && names.contains(&"curve.png".into()), "{names:?}");
     let folder = tempfile::tempdir().unwrap();
     let single = folder.path().join("single");
     succeed("train", &train(&trained().data, &single, 1));
@@ -110,6 +110,34 @@ fn a_prior_is_the_same_for_one_thread_and_two_and_after_a_kill() {
     assert!(kill_when("train", &arguments, || saved.exists()), "it ended before it could be killed");
     succeed("train", &arguments);
     assert!(prior_files(&killed) == expected, "a killed and resumed prior differs");
+}
+
+#[test]
+fn a_calibration_report_is_the_same_for_one_thread_and_two_and_wants_other_worlds() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, memoryless) = (folder.path().join("data"), folder.path().join("memoryless"));
+    succeed("datagen", &format!("{DATA} --seed 2 --out {}", data.display()));
+    succeed("train", &format!("--memoryless {}", train(&trained().data, &memoryless, 2)));
+    let arguments = |data: &Path, threads: usize, out: &Path| {
+        let (prior, data, memoryless) = (trained().prior.display(), data.display(), memoryless.display());
+        format!("--prior {prior} --data {data} --memoryless {memoryless} --threads {threads} --out {}", out.display())
+    };
+    let (double, single) = (folder.path().join("double"), folder.path().join("single"));
+    let printed = succeed("calibrate", &format!("--json {}", arguments(&data, 2, &double)));
+    succeed("calibrate", &arguments(&data, 1, &single));
+    assert!(files(&double) == files(&single), "one thread and two give different reports");
+    let report: serde_json::Value = serde_json::from_str(&printed).unwrap();
+    for key in ["nll", "baseline_nll", "memoryless_nll", "shape_accuracy", "obstacle_after_contact_accuracy"] {
+        assert!(report[key].as_f64().is_some_and(f64::is_finite), "{key}: {}", report[key]);
+    }
+    let mass = report["parameters"].as_array().unwrap().iter().find(|p| p["name"] == "object_mass_kg").unwrap();
+    assert!(mass["coverage90"].as_f64().is_some() && mass["coverage50"].as_f64().is_some(), "{mass}");
+
+    let refused = run("calibrate", &arguments(&trained().data, 1, &folder.path().join("none")));
+    let message = stderr(&refused);
+    assert_eq!(refused.status.code(), Some(2), "{message}");
+    assert!(message.contains("info.json: seed is 1") && message.contains("expected another"), "{message}");
+    assert!(!folder.path().join("none").exists());
 }
 
 #[test]

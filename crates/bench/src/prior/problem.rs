@@ -5,9 +5,10 @@ use std::path::Path;
 use anyhow::{Context as _, Result, ensure};
 use dataset::Reader;
 use pomdp::{Purpose, Rng, Seed};
+use prior::features::ActionInput;
 use prior::{
-    ClassTarget, GradientPath, Layout, NetworkConfig, Normalisation, Parameters, Sequence, TrainConfig, Trainer,
-    features, is_held_out,
+    ClassTarget, GradientPath, Layout, NetworkConfig, Normalisation, Parameters, Schedule, Sequence, TrainConfig,
+    Trainer, Transform, features, is_held_out,
 };
 use rand::RngExt as _;
 use rand::seq::SliceRandom as _;
@@ -34,8 +35,9 @@ pub(crate) struct Problem {
 /// The network of the paper, trained as `train` does.
 fn published(held_out: f64, clip_norm: Option<f64>) -> TrainConfig {
     TrainConfig {
-        network: NetworkConfig { hidden: vec![128, 128], components: 10 },
+        network: NetworkConfig { hidden: vec![128, 128], components: 10, memory: true },
         learning_rate: 0.001,
+        schedule: Schedule::Constant,
         batch: BATCH,
         chunks: 4,
         held_out,
@@ -44,6 +46,7 @@ fn published(held_out: f64, clip_norm: Option<f64>) -> TrainConfig {
         clip_norm,
         weight_decay: 0.0,
         dropout: 0.0,
+        rescale: false,
         gradient: GradientPath::Fused,
     }
 }
@@ -58,6 +61,7 @@ impl Problem {
             robot: "sawyer".into(),
             observation: names("observation", 20),
             continuous: names("target", 45),
+            transforms: vec![Transform::Identity; 45],
             classes: kinds
                 .map(|(name, labels)| ClassTarget { name: name.into(), labels: names("label", labels) })
                 .into(),
@@ -75,8 +79,8 @@ impl Problem {
     /// The dataset in `dir`.
     pub(crate) fn recorded(dir: &Path) -> Result<Self> {
         let reader = Reader::open(dir).with_context(|| format!("{}: no usable dataset", dir.display()))?;
-        let layout = features::layout_of_dataset(&reader.manifest().schema);
-        let data = reader.episodes()?.iter().map(features::sequence).collect();
+        let layout = features::layout_of_dataset(&reader.manifest().schema, ActionInput::Off);
+        let data = reader.episodes()?.iter().map(|episode| features::sequence(&layout, episode)).collect();
         Ok(Self { layout, data, config: published(0.1, Some(10.0)) })
     }
 
