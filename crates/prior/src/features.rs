@@ -109,7 +109,7 @@ fn theta_targets(theta: Vec<String>) -> Vec<String> {
 }
 
 /// Width, depth and height, m, of a shape of `size`: what a value stands for that does not apply is kept out by the mask.
-fn extents(shape: ObjectShape, size: [f64; 3]) -> ([f64; 3], [bool; 3]) {
+pub(crate) fn extents(shape: ObjectShape, size: [f64; 3]) -> ([f64; 3], [bool; 3]) {
     match shape {
         ObjectShape::Box => (size, [true; 3]),
         ObjectShape::Cylinder => ([2.0 * size[0], 0.0, size[1]], [true, false, true]),
@@ -126,8 +126,21 @@ fn sizes(shape: ObjectShape, [width, depth, height]: [f64; 3]) -> [f64; 3] {
     }
 }
 
+/// Θ from its targets without their transforms; values that do not apply to the classes are left out.
+pub(crate) fn theta_of_targets(targets: &[f64], classes: &[usize]) -> Theta {
+    let mut values = [0.0; THETA_LEN];
+    values.copy_from_slice(targets);
+    for (at, class) in [(5, classes[0]), (9, classes[1])] {
+        if let Some(shape) = ObjectShape::ALL.get(class) {
+            let extents = [values[at], values[at + 1], values[at + 2]];
+            values[at..at + 3].copy_from_slice(&sizes(*shape, extents));
+        }
+    }
+    Theta::from_parts(&values, [classes[0], classes[1]])
+}
+
 /// Θ as its targets are given, and which of them apply.
-fn theta_row(theta: &Theta) -> ([f64; THETA_LEN], [bool; THETA_LEN]) {
+pub(crate) fn theta_row(theta: &Theta) -> ([f64; THETA_LEN], [bool; THETA_LEN]) {
     let (mut values, mut applies) = (theta.continuous(), theta.applies());
     let obstacle = theta.obstacle.as_ref().map(|o| (9, o.shape, o.size_m));
     for (at, shape, size) in [Some((5, theta.object.shape, theta.object.size_m)), obstacle].into_iter().flatten() {
@@ -231,13 +244,10 @@ pub fn particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: usize
     values[0] = values[0].clamp(SMALLEST_MASS_KG, LARGEST_MASS_KG);
     values[8] = values[8].clamp(SMALLEST_MASS_KG, LARGEST_MASS_KG);
     values[4] = values[4].clamp(0.0, 1.0);
-    for (at, class) in [(5, draw.classes[0]), (9, draw.classes[1])] {
-        let extents = [0, 1, 2].map(|i| values[at + i].max(SMALLEST_SIZE_M));
-        if let Some(shape) = ObjectShape::ALL.get(class) {
-            values[at..at + 3].copy_from_slice(&sizes(*shape, extents));
-        }
+    for (at, _) in SIZES {
+        values[at] = values[at].max(SMALLEST_SIZE_M);
     }
-    let mut theta = Theta::from_parts(&values, [draw.classes[0], draw.classes[1]]);
+    let mut theta = theta_of_targets(&values, &draw.classes);
     let object = &mut theta.object;
     let half = object.shape.half_extents_m(object.size_m);
     for (com, half) in object.com_m.iter_mut().zip(half) {

@@ -55,6 +55,7 @@
 
 pub mod calibrate;
 pub mod checkpoint;
+pub mod density;
 pub mod error;
 pub mod features;
 mod files;

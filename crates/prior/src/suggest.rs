@@ -2,10 +2,12 @@
 
 use std::path::Path;
 
+use physics_model::config::ObstacleMobility;
 use physics_model::{Action, Observation, Particle, PushModel};
 use pomdp::{Prior, Rng};
 
 use crate::checkpoint::{Checkpoint, FILE};
+use crate::density;
 use crate::features::{self, ActionInput};
 use crate::mixture::Mixture;
 use crate::{Error, Inference, Layout};
@@ -51,6 +53,21 @@ impl Suggester {
     pub fn sample(&self, table_height_m: f64, rng: &mut Rng) -> Option<Particle> {
         let (mixture, observation) = self.latest.as_ref()?;
         Some(features::particle(&self.layout, &mixture.sample(rng), observation, self.joints, table_height_m))
+    }
+
+    /// A draw for a filter that weighs it by [`Self::log_density`]: not moved into the physical ranges, so that it may be no possible
+    /// world; of its state only a fixed obstacle's pose counts. `None` before the first observation.
+    pub fn sample_raw(&self, table_height_m: f64, rng: &mut Rng) -> Option<Particle> {
+        let (mixture, observation) = self.latest.as_ref()?;
+        Some(density::raw_particle(&self.layout, &mixture.sample(rng), observation, self.joints, table_height_m))
+    }
+
+    /// ln of the density of a particle's static parameters under the latest suggestion, for worlds with obstacles of this mobility; −∞
+    /// before the first observation.
+    #[must_use]
+    pub fn log_density(&self, mobility: ObstacleMobility, particle: &Particle) -> f64 {
+        let latest = self.latest.as_ref();
+        latest.map_or(f64::NEG_INFINITY, |(mixture, _)| density::log_density(mixture, self.joints, mobility, particle))
     }
 
     /// The mean of the strongest component with its likeliest shapes; `None` before the first observation.
