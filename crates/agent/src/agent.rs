@@ -1,11 +1,11 @@
 //! The loop.
 
 use belief::Particles;
-use physics_model::{Action, HeuristicPolicy, Observation, Particle, PushModel};
+use physics_model::{Action, GoalPolicy, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::Pomcp;
-use pomdp::{Discretise as _, Outcome, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
+use pomdp::{Discretise as _, Outcome, Policy, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
 use prior::Suggester;
-use scenario::{Filter, Problem, Tracker, with_known_joints};
+use scenario::{Filter, Problem, Rollouts, Tracker, with_known_joints};
 
 use crate::{Episode, Error, Method, Reason, StepRecord, World};
 
@@ -47,8 +47,13 @@ impl<'a> Agent<'a> {
         if method.needs_prior() && prior.is_none() {
             return Err(Error::NoPrior { method: method.name() });
         }
-        if method.needs_prior() && problem.scenario.belief.filter == Filter::Weighted {
-            return Err(Error::NoDensity { method: method.name() });
+        let filter = problem.scenario.belief.filter;
+        match (method, filter) {
+            (Method::RnnMax | Method::RnnSampling, Filter::Weighted) => {
+                return Err(Error::NoDensity { method: method.name() });
+            }
+            (Method::Mixture, Filter::Rejection) => return Err(Error::NoWeights { method: method.name() }),
+            _ => {}
         }
         let prior = if method.needs_prior() { prior.cloned() } else { None };
         Ok(Self { problem, method, prior })
@@ -109,7 +114,14 @@ impl<'a> Agent<'a> {
             };
             mind = match mind {
                 Mind::Belief(mut search, particles, mut filter) => {
-                    let proposals = Proposals::unweighted(&proposals);
+                    let mobility = model.config().world.obstacle_mobility;
+                    let prior = self.prior.as_ref();
+                    let density =
+                        |p: &Particle| prior.map_or(f64::NEG_INFINITY, |prior| prior.log_density(mobility, p));
+                    let proposals = match self.method {
+                        Method::Mixture => Proposals::weighted(&proposals, &density),
+                        _ => Proposals::unweighted(&proposals),
+                    };
                     match filter.update(model, particles, record.action, &observation, proposals, &mut streams.filter) {
                         Ok((particles, report)) => {
                             depletions += usize::from(report.acceptance == 0.0 || report.recoveries > 0);
@@ -157,7 +169,7 @@ impl<'a> Agent<'a> {
         Ok(match self.method {
             Method::Heuristic => Mind::Heuristic,
             Method::Oracle => Mind::Oracle(search()?),
-            Method::NoRnn | Method::RnnMax | Method::RnnSampling => {
+            Method::NoRnn | Method::RnnMax | Method::RnnSampling | Method::Mixture => {
                 let mut rng = seed.stream(Purpose::InitialBelief, 0);
                 let particles = self.problem.initial_particles(scenario.belief.particles(), observation, &mut rng)?;
                 let particles = Particles::uniform(particles)?;
@@ -176,15 +188,19 @@ impl<'a> Agent<'a> {
         streams: &mut Streams,
     ) -> Result<StepRecord, Error> {
         let model = &self.problem.model;
+        let policy: &(dyn Policy<PushModel> + Sync) = match self.problem.scenario.agent.rollouts {
+            Rollouts::Heuristic => &HeuristicPolicy,
+            Rollouts::Goal => &GoalPolicy,
+        };
         let searched = match mind {
             Mind::Heuristic => None,
             Mind::Oracle(search) => {
                 let truth = world.truth().ok_or(Error::NoTruth)?.clone();
                 let belief = Particles::uniform(vec![truth])?;
-                Some(search.search(model, &belief, &HeuristicPolicy, remaining, &mut streams.search))
+                Some(search.search(model, &belief, policy, remaining, &mut streams.search))
             }
             Mind::Belief(search, particles, _) => {
-                Some(search.search(model, particles, &HeuristicPolicy, remaining, &mut streams.search))
+                Some(search.search(model, particles, policy, remaining, &mut streams.search))
             }
         };
         let reused = searched.as_ref().map_or(0, |report| report.reused);
@@ -234,6 +250,10 @@ fn suggest(prior: &Suggester, method: Method, context: &Context<'_>, count: usiz
         fits.then_some(particle)
     };
     let table_height_m = context.model.config().world.table_height_m;
+    if method == Method::Mixture {
+        // All of them: leaving out what does not fit would change the density that they are drawn from.
+        return (0..count).filter_map(|_| prior.sample_raw(table_height_m, rng)).collect();
+    }
     if method == Method::RnnMax {
         let strongest = prior.strongest(table_height_m).and_then(complete);
         return strongest.into_iter().flat_map(|particle| std::iter::repeat_n(particle, count)).collect();

@@ -21,11 +21,19 @@ pub enum Error {
         /// Method.
         method: &'static str,
     },
-    /// The weighted filter needs the density that suggestions were drawn from, which the prior does not give.
+    /// The weighted filter needs the density of all draws, which is not known of those that were chosen by the observation.
     #[error(
-        "method {method} does not go with belief.filter = \"weighted\", which needs the density of the prior's suggestions: use no-rnn, oracle or heuristic"
+        "method {method} does not go with belief.filter = \"weighted\", which needs the density of its suggestions: use mixture, no-rnn, oracle or heuristic"
     )]
     NoDensity {
+        /// Method.
+        method: &'static str,
+    },
+    /// The rejection filter has no weights.
+    #[error(
+        "method {method} does not go with belief.filter = \"rejection\", which cannot weigh suggestions: use rnn-sampling"
+    )]
+    NoWeights {
         /// Method.
         method: &'static str,
     },

@@ -14,6 +14,8 @@ pub enum Method {
     RnnMax,
     /// Draws from the network's mixture join the belief.
     RnnSampling,
+    /// Draws from the network's mixture join the belief with importance weights, for a filter that weighs its particles.
+    Mixture,
     /// Upper bound: the same search, from the true state and parameters.
     Oracle,
     /// Lower bound: the heuristic policy on the measured object, without search.
@@ -22,7 +24,8 @@ pub enum Method {
 
 impl Method {
     /// All methods, in the order of tables.
-    pub const ALL: [Self; 5] = [Self::NoRnn, Self::RnnMax, Self::RnnSampling, Self::Oracle, Self::Heuristic];
+    pub const ALL: [Self; 6] =
+        [Self::NoRnn, Self::RnnMax, Self::RnnSampling, Self::Mixture, Self::Oracle, Self::Heuristic];
     /// The methods of the published tables.
     pub const PUBLISHED: [Self; 3] = [Self::NoRnn, Self::RnnMax, Self::RnnSampling];
 
@@ -33,6 +36,7 @@ impl Method {
             Self::NoRnn => "no-rnn",
             Self::RnnMax => "rnn-max",
             Self::RnnSampling => "rnn-sampling",
+            Self::Mixture => "mixture",
             Self::Oracle => "oracle",
             Self::Heuristic => "heuristic",
         }
@@ -41,7 +45,7 @@ impl Method {
     /// Whether it needs a trained prior.
     #[must_use]
     pub const fn needs_prior(self) -> bool {
-        matches!(self, Self::RnnMax | Self::RnnSampling)
+        matches!(self, Self::RnnMax | Self::RnnSampling | Self::Mixture)
     }
 }
 

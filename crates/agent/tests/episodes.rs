@@ -81,6 +81,8 @@ fn a_method_that_needs_a_prior_says_so() {
     let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
     let prior = prior::Suggester::load(&root.join("assets/priors/sawyer"), "sawyer", &problem.model).unwrap();
     let weighted = self::problem("D1", &["belief.filter=\"weighted\""]);
+    let unweighted = Agent::new(&problem, Method::Mixture, Some(&prior));
+    assert!(matches!(unweighted, Err(Error::NoWeights { .. })), "the filter has no weights");
     let refused = Agent::new(&weighted, Method::RnnSampling, Some(&prior));
     assert!(matches!(refused, Err(Error::NoDensity { .. })), "the filter needs the density of what is suggested");
 }

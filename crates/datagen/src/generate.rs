@@ -190,8 +190,9 @@ mod tests {
                 (0..60).filter(|e| generator.episode(*e).unwrap().rows.iter().any(hit)).count()
             };
             let (goal, heuristic) = (reached("1.0"), reached("0.0"));
-            // Measured: 57 and 29 for the Sawyer, 51 and 55 for the Jaco, whose hand holds what it pushes.
-            assert!(goal >= 45, "{robot}: {goal} of 60");
+            // Measured: 60 and 29 for the Sawyer, 55 and 55 for the Jaco, whose hand holds what it pushes. Behind an obstacle (D4) 47 and
+            // 26, and 39 and 45.
+            assert!(goal >= 50, "{robot}: {goal} of 60");
             assert!(robot == "jaco" || goal > heuristic + 15, "{robot}: {goal} and {heuristic} of 60");
         }
     }

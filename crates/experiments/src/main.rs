@@ -29,8 +29,8 @@ struct Arguments {
     /// Preset of belief and planner.
     #[arg(long, default_value = "paper")]
     preset: String,
-    /// Methods, separated by commas: no-rnn, rnn-max, rnn-sampling, oracle, heuristic [default: no-rnn,rnn-max,rnn-sampling;
-    /// no-rnn with preset surmise].
+    /// Methods, separated by commas: no-rnn, rnn-max, rnn-sampling, mixture, oracle, heuristic [default: no-rnn,rnn-max,rnn-sampling;
+    /// no-rnn,mixture with preset surmise].
     #[arg(long, value_delimiter = ',')]
     methods: Vec<Method>,
     /// Trials a method [default: the scenario's].
@@ -111,7 +111,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     if methods.is_empty() {
         methods = match scenario.belief.filter {
             Filter::Rejection => vec![Method::NoRnn, Method::RnnMax, Method::RnnSampling],
-            Filter::Weighted => vec![Method::NoRnn],
+            Filter::Weighted => vec![Method::NoRnn, Method::Mixture],
         };
     }
     methods.sort();

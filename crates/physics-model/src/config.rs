@@ -157,6 +157,15 @@ pub struct TaskConfig {
     pub reward: RewardConfig,
 }
 
+impl TaskConfig {
+    /// Discounted reward of steps that lead nowhere after this one, up to the horizon. A world that diverges costs as much: ending without
+    /// a cost it would be the way out of every situation that looks bad.
+    #[must_use]
+    pub fn endless_cost(&self) -> f64 {
+        (1..self.horizon).map(|step| self.reward.step * self.discount.powi(step as i32)).sum()
+    }
+}
+
 /// Standard deviations of the sensors' Gaussian noise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

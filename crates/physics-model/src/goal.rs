@@ -1,4 +1,4 @@
-//! A policy that knows the task: bring the tool behind the object, then push it towards the goal.
+//! A policy that knows the task: bring the tool behind the object, then push it towards the goal, round an obstacle in the way.
 
 use nalgebra::Vector2;
 use pomdp::{Policy, Rng};
@@ -12,42 +12,66 @@ const PUSHING_SHARE: f64 = 0.4;
 /// Pull back to that line while pushing, in moves along the line per radius off it.
 const STEERING: f64 = 2.0;
 
-/// Goes round the object to the side away from the goal and pushes along the line to the goal, steering back to it. It sees no obstacle
-/// and turns no object: a demonstration, not a plan.
+/// Nearer to the line behind the object than this (cosine of the angle at the object) the tool goes straight there.
+const STRAIGHT_COSINE: f64 = 0.7;
+/// Room, m, that is left between the object and an obstacle that it passes.
+const ROOM_M: f64 = 0.01;
+
+/// Goes round the object to the side away from the goal and pushes along the line to the goal, steering back to it; past an obstacle on
+/// that line by a point beside it. It sees the whole state, so it is a rollout policy and a demonstration, not a plan.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct GoalPolicy;
 
 impl GoalPolicy {
+    /// Where the object should go next: the goal, or a point beside the obstacle that is in the way.
+    fn target(model: &PushModel, particle: &Particle) -> Vector2<f64> {
+        let goal = Vector2::new(model.config().task.goal.x_m, model.config().task.goal.y_m);
+        let (Some(theta), Some(body)) = (&particle.theta.obstacle, &particle.state.obstacle) else { return goal };
+        let object = Vector2::new(particle.state.object.position_m[0], particle.state.object.position_m[1]);
+        let obstacle = Vector2::new(body.position_m[0], body.position_m[1]);
+        let shape = &particle.theta.object;
+        let clearance_m =
+            shape.shape.footprint_radius_m(shape.size_m) + theta.shape.footprint_radius_m(theta.size_m) + ROOM_M;
+        let Some(along) = (goal - object).try_normalize(1e-9) else { return goal };
+        let ahead_m = (obstacle - object).dot(&along);
+        let aside = object + along * ahead_m - obstacle;
+        // Behind the object, behind the goal or out of the way.
+        let length_m = (goal - object).norm();
+        if ahead_m <= 0.0 || ahead_m > length_m + clearance_m || aside.norm() >= clearance_m {
+            return goal;
+        }
+        let across = Vector2::new(-along.y, along.x);
+        let side = if aside.dot(&across) < 0.0 { -across } else { across };
+        obstacle + side * clearance_m
+    }
+
     /// Direction in which the tool should go, base frame; not of unit length.
     fn direction(model: &PushModel, particle: &Particle) -> Option<Vector2<f64>> {
-        let task = &model.config().task;
-        let plane = |v: [f64; 3]| Vector2::new(v[0], v[1]);
-        let object = plane(particle.state.object.position_m);
-        let along = (Vector2::new(task.goal.x_m, task.goal.y_m) - object).try_normalize(1e-9)?;
+        let object = Vector2::new(particle.state.object.position_m[0], particle.state.object.position_m[1]);
+        let along = (Self::target(model, particle) - object).try_normalize(1e-9)?;
         let across = Vector2::new(-along.y, along.x);
         let theta = &particle.theta.object;
         let radius_m = theta.shape.footprint_radius_m(theta.size_m);
-        let offset = plane(model.tool_position_m(&particle.state.joints_rad)) - object;
+        let tool = model.tool_position_m(&particle.state.joints_rad);
+        let offset = Vector2::new(tool[0], tool[1]) - object;
         let (ahead_m, aside_m) = (offset.dot(&along), offset.dot(&across));
-        let side = if aside_m < 0.0 { -across } else { across };
-        let behind_m = radius_m + tool_extent_m(model, along);
-        let beside_m = radius_m + tool_extent_m(model, -side) + task.step_m / 2.0;
         // What is wider than the object holds it between its ends: it goes where the tool goes. A narrow tool turns it round the contact.
         let half_width_m = tool_extent_m(model, across).min(tool_extent_m(model, -across));
         let (tolerance_m, steering) =
             if half_width_m > radius_m { (half_width_m, 0.0) } else { (PUSHING_SHARE * radius_m, STEERING) };
-        let direction = if ahead_m < 0.0 && aside_m.abs() < tolerance_m {
-            along - across * (steering * aside_m / radius_m)
-        } else if ahead_m < -behind_m {
-            // Far enough back to slide to the line.
-            -side
-        } else if aside_m.abs() < beside_m {
-            // In the way: out to the side before going back.
-            side - along * 0.5
-        } else {
-            -along
-        };
-        Some(direction)
+        if ahead_m < 0.0 && aside_m.abs() < tolerance_m {
+            return Some(along - across * (steering * aside_m / radius_m));
+        }
+        // To the place behind the object: straight where nothing is in between, else round the object.
+        let behind = -along * (radius_m + tool_extent_m(model, along) + ROOM_M);
+        let away = offset.try_normalize(1e-9)?;
+        if away.dot(&-along) > STRAIGHT_COSINE {
+            return Some(behind - offset);
+        }
+        let round = Vector2::new(-away.y, away.x);
+        let round = if round.dot(&along) > 0.0 { -round } else { round };
+        let clear_m = radius_m + tool_extent_m(model, -away) + ROOM_M;
+        Some(round + away * ((clear_m - offset.norm()) / model.config().task.step_m).clamp(-1.0, 1.0))
     }
 }
 
@@ -70,6 +94,27 @@ impl Policy<PushModel> for GoalPolicy {
             }
         }
         best.1
+    }
+
+    /// As if tool and object went straight, step by step: first the tool to the place behind the object, then both to the goal region.
+    fn leaf_value(&self, model: &PushModel, particle: &Particle, actions_left: usize) -> f64 {
+        let task = &model.config().task;
+        let object = Vector2::new(particle.state.object.position_m[0], particle.state.object.position_m[1]);
+        let tool = model.tool_position_m(&particle.state.joints_rad);
+        let target = Self::target(model, particle);
+        let goal = Vector2::new(task.goal.x_m, task.goal.y_m);
+        let along = (target - object).try_normalize(1e-9).unwrap_or_default();
+        let theta = &particle.theta.object;
+        let behind = theta.shape.footprint_radius_m(theta.size_m) + tool_extent_m(model, along);
+        let to_place_m = (object - along * behind - Vector2::new(tool[0], tool[1])).norm();
+        let by_way_m = if target == goal { 0.0 } else { (goal - target).norm() };
+        let to_goal_m = ((target - object).norm() + by_way_m - task.goal.radius_m).max(0.0);
+        let steps = ((to_place_m + to_goal_m) / task.step_m).ceil().max(1.0) as usize;
+        let cost = |count: usize| (0..count).map(|t| task.reward.step * task.discount.powi(t as i32)).sum::<f64>();
+        if steps > actions_left {
+            return cost(actions_left);
+        }
+        cost(steps) + task.reward.goal * task.discount.powi(steps as i32 - 1)
     }
 }
 

@@ -209,7 +209,7 @@ impl PushModel {
         if report.divergence.is_some() {
             // The state stays as it was, so that nothing downstream meets a value that is not finite.
             let observation = self.config.sensor.observe(&self.readings(particle), rng);
-            let reward = task.reward.reward(report.events);
+            let reward = task.reward.reward(report.events) + task.endless_cost();
             return (Step { observation, reward, outcome: Outcome::Diverged }, report);
         }
         let before = particle.state.object.position_m;

@@ -23,6 +23,6 @@ pub use load::{Selection, find_root};
 pub use provenance::commit;
 pub use schema::{
     AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,
-    InitialObstacle, Published, Scenario, VERSION,
+    InitialObstacle, Published, Rollouts, Scenario, VERSION,
 };
 pub use tracker::{Tracker, with_known_joints};

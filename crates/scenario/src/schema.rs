@@ -142,6 +142,19 @@ pub struct InitialBeliefConfig {
 pub struct AgentConfig {
     /// Draws from the learned prior after each action.
     pub proposals: usize,
+    /// Default policy of the search's simulations.
+    pub rollouts: Rollouts,
+}
+
+/// Default policy of simulations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rollouts {
+    /// The tool goes to the object's centre, as published; a cut rollout is worth nothing more.
+    Heuristic,
+    /// [`physics_model::GoalPolicy`], which pushes to the goal past the obstacle that its particle believes in; a cut rollout is worth what
+    /// its leaf value says.
+    Goal,
 }
 
 /// Training data.
