@@ -333,7 +333,8 @@ mod tests {
             off_m.push((p[0] - measured[0]).hypot(p[1] - measured[1]));
         }
         off_m.sort_by(f64::total_cmp);
-        assert!(off_m[20] < 0.04, "the network knows where the object is: {} m off in the median", off_m[20]);
+        // Measured to 2 mm; among the draws of one episode 3 mm in the median.
+        assert!(off_m[20] < 0.006, "{} m off in the median", off_m[20]);
         assert!(sampled.iter().any(|p| *p != sampled[0]), "draws differ");
         let shapes: std::collections::BTreeSet<ObjectShape> = sampled.iter().map(|p| p.theta.object.shape).collect();
         assert!(shapes.len() > 1, "more than one shape is still possible");

@@ -7,6 +7,21 @@
 //! One set of weights, three ways to run it, held to each other by tests: [`network`] in burn with autodiff, the reference;
 //! [`fused`] by hand on packed batches, for training; [`inference`] on plain slices, one step at a time.
 //!
+//! # What was decided, and why
+//!
+//! The paper gives the network (LSTM 2 × 128, tanh, ten diagonal components, Adam with 0.001, batches of 128) and the loss. The rest:
+//!
+//! - **Targets** ([`features`], [`Transform`]): what is measured as the difference from the measurement, masses as logarithms, sizes as extents, states
+//!   down to a resolution. With plain targets the likelihood was spent on velocities that are 0 and on positions that were measured
+//!   anyway: the right shape at the end of 58 % of the held-out episodes, positions 3 cm off. Now 89 % and 3 mm.
+//! - **Inputs**: median and quartiles, then asinh. Scaled by the standard deviation, a blocked push of 100 N hid the 2 N of a free one: the obstacle
+//!   was found in 81 % of the episodes that touched it and denied in 56 % of those without one, then 86 % and 53 % (data without dropout).
+//! - **Dropout** 0.1 on the output of each layer, by held-out likelihood at epoch 100: −117.85, −118.29, −118.20 nats a step for 0, 0.1, 0.2.
+//!   A cosine schedule instead of a constant rate.
+//! - **One factor a target** on the stated spread, fitted on the held-out part ([`TrainConfig::rescale`]): early stopping leaves a network too sure of what it
+//!   has learnt by heart. Calibration is measured on other data, of another seed.
+//! - **Suggestions as proposals** ([`density`]): their density in the coordinates of the belief filter.
+//!
 //! # Example
 //!
 //! ```

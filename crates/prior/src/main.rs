@@ -41,6 +41,9 @@ struct Arguments {
     /// Decoupled weight decay; the paper has none.
     #[arg(long, default_value_t = 0.0)]
     weight_decay: f64,
+    /// Computes gradients by burn's autodiff on its device, see the cargo features flex, wgpu and cuda, instead of by hand on the CPU.
+    #[arg(long)]
+    autodiff: bool,
     /// Keeps the learning rate at 0.001, as published, instead of letting it fall along half a cosine.
     #[arg(long)]
     constant_rate: bool,
@@ -134,7 +137,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
         weight_decay: arguments.weight_decay,
         dropout: arguments.dropout,
         rescale: true,
-        gradient: GradientPath::Fused,
+        gradient: if arguments.autodiff { GradientPath::Autodiff } else { GradientPath::Fused },
     };
     let seed = Seed(arguments.seed);
     let state = out.join("training");
