@@ -5,12 +5,14 @@
 
 mod error;
 mod interval;
+mod paired;
 mod run;
 mod table;
 mod trial;
 
 pub use error::Error;
 pub use interval::wilson95;
+pub use paired::Pair;
 pub use run::{Provenance, Run, RunIdentity};
 pub use table::{Row, Table};
 pub use trial::{TrialRecord, play};

@@ -7,6 +7,7 @@ use agent::{Method, Reason};
 use scenario::Published;
 use serde::{Deserialize, Serialize};
 
+use crate::paired::{Pair, pairs};
 use crate::{Provenance, TrialRecord, wilson95};
 
 /// A method's row.
@@ -49,6 +50,8 @@ pub struct Row {
 pub struct Table {
     /// One row a method.
     pub rows: Vec<Row>,
+    /// Every two methods on the worlds that both played.
+    pub pairs: Vec<Pair>,
     /// Where the numbers come from.
     pub provenance: Provenance,
 }
@@ -97,7 +100,13 @@ impl Table {
                 obstacle_touched: count(&|t| t.obstacle_touched),
             }
         };
-        Self { rows: provenance.methods.iter().map(row).collect(), provenance: provenance.clone() }
+        let played = trials.iter().filter(|((_, trial), _)| *trial < provenance.trials);
+        let played = played.map(|(key, record)| (*key, record.clone())).collect();
+        Self {
+            rows: provenance.methods.iter().map(row).collect(),
+            pairs: pairs(&provenance.methods, &played),
+            provenance: provenance.clone(),
+        }
     }
 
     /// For people.
@@ -133,6 +142,14 @@ impl Table {
                 row.obstacle_touched,
                 row.with_obstacle,
             );
+        }
+        if !self.pairs.is_empty() {
+            text += "\n| same worlds | both | first only | second only | neither | McNemar p |\n|---|---|---|---|---|---|\n";
+        }
+        for pair in &self.pairs {
+            let Pair { first, second, both, first_only, second_only, neither, p } = pair;
+            let names = format!("{}, {}", first.name(), second.name());
+            let _ = writeln!(text, "| {names} | {both} | {first_only} | {second_only} | {neither} | {p:.3} |");
         }
         text
     }
