@@ -63,8 +63,8 @@ impl<'a> Agent<'a> {
     ///
     /// # Errors
     ///
-    /// Where the world fails, or the scenario and the first observation contradict each other. Depletion is not an error: it
-    /// ends the episode.
+    /// Where the scenario and the first observation contradict each other. Depletion and a world that fails are no errors: they end the
+    /// episode.
     pub fn run(&mut self, world: &mut dyn World, seed: Seed) -> Result<Episode, Error> {
         let horizon = self.problem.scenario.task.horizon;
         let model = &self.problem.model;
@@ -73,7 +73,10 @@ impl<'a> Agent<'a> {
             filter: seed.stream(Purpose::Filter, 0),
             suggestion: seed.stream(Purpose::Suggestion, 0),
         };
-        let (mut observation, mut joints_rad) = world.reset()?;
+        let (mut observation, mut joints_rad) = match world.reset() {
+            Err(Error::World(error)) => return Ok(Episode::failed(sentence(&error))),
+            reset => reset?,
+        };
         if let Some(prior) = &mut self.prior {
             prior.reset();
             prior.suggest(None, &observation);
@@ -83,9 +86,16 @@ impl<'a> Agent<'a> {
         let mut steps: Vec<StepRecord> = Vec::new();
         let mut depletions = 0;
         let mut reason = Reason::Horizon;
+        let mut failure = None;
         for time in 0..horizon {
             let mut record = self.decide(&mut mind, world, &observation, &joints_rad, horizon - time, &mut streams)?;
-            let answer = world.act(record.action)?;
+            let answer = match world.act(record.action) {
+                Err(Error::World(error)) => {
+                    (reason, failure) = (Reason::WorldFailed, Some(sentence(&error)));
+                    break;
+                }
+                answer => answer?,
+            };
             // Only moving the object (or reaching the goal, which ends the episode) pays more than a plain step.
             object_moved |= answer.reward > self.problem.scenario.task.reward.step;
             record.observation = answer.observation.clone();
@@ -160,7 +170,7 @@ impl<'a> Agent<'a> {
         }
         let rewards = steps.iter().map(|s| s.reward);
         let discounted_return = discounted_return(rewards, self.problem.scenario.task.discount);
-        Ok(Episode { reason, discounted_return, depletions, steps })
+        Ok(Episode { reason, discounted_return, depletions, steps, failure })
     }
 
     fn first_mind(&self, observation: &Observation, seed: Seed) -> Result<Mind<'a>, Error> {
@@ -266,6 +276,12 @@ fn suggest(prior: &Suggester, method: Method, context: &Context<'_>, count: usiz
         particles.extend(prior.sample(table_height_m, rng).and_then(complete));
     }
     particles
+}
+
+/// An error with its causes.
+fn sentence(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |cause| cause.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }
 
 fn obstacle_share(particles: &Particles<Particle>) -> f64 {

@@ -41,6 +41,6 @@ pub enum Error {
     #[error("method oracle needs a world that knows its true state")]
     NoTruth,
     /// The world failed.
-    #[error("the world failed: {0}")]
-    World(String),
+    #[error(transparent)]
+    World(#[from] crate::WorldError),
 }

@@ -1,15 +1,20 @@
 //! Algorithm 1 of Hayashi et al. (ICRA 2019): search from the belief, act, observe, let the network suggest, update, prune.
 //!
-//! [`Agent::run`] plays one episode on a [`World`] with one [`Method`] and returns its [`Episode`].
+//! [`Agent::run`] plays one episode on a [`World`] with one [`Method`] and returns its [`Episode`]. The world is simulated
+//! ([`SimulatedWorld`]) or another program ([`ExternalWorld`]).
 
 mod agent;
 mod error;
+mod external;
 mod method;
 mod record;
 mod world;
 
 pub use agent::Agent;
 pub use error::Error;
+pub use external::{
+    ExternalEpisode, ExternalWorld, LINE_LIMIT_BYTES, PROTOCOL, Timeouts, WorldAddress, WorldError, WorldIdentity,
+};
 pub use method::Method;
 pub use record::{Episode, Reason, StepRecord};
 pub use world::{SimulatedWorld, World, WorldStep};

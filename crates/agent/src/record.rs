@@ -16,6 +16,22 @@ pub enum Reason {
     Depleted,
     /// The true world became impossible.
     Diverged,
+    /// The world did not answer, or not properly.
+    WorldFailed,
+}
+
+impl Reason {
+    /// Name in tables and files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Goal => "goal",
+            Self::Horizon => "horizon",
+            Self::Depleted => "depleted",
+            Self::Diverged => "diverged",
+            Self::WorldFailed => "world-failed",
+        }
+    }
 }
 
 /// One step of an episode.
@@ -56,9 +72,19 @@ pub struct Episode {
     pub depletions: usize,
     /// Steps.
     pub steps: Vec<StepRecord>,
+    /// What the world did wrong, where that ended the episode.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
 }
 
 impl Episode {
+    /// An episode that ended before it began.
+    #[must_use]
+    pub fn failed(failure: String) -> Self {
+        let (reason, failure) = (Reason::WorldFailed, Some(failure));
+        Self { reason, discounted_return: 0.0, depletions: 0, steps: Vec::new(), failure }
+    }
+
     /// Whether the object reached the goal region.
     #[must_use]
     pub fn success(&self) -> bool {
@@ -69,5 +95,17 @@ impl Episode {
     #[must_use]
     pub fn transitions(&self) -> usize {
         self.steps.iter().map(|s| s.transitions).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_in_tables_and_files_agree() {
+        for reason in [Reason::Goal, Reason::Horizon, Reason::Depleted, Reason::Diverged, Reason::WorldFailed] {
+            assert_eq!(serde_json::to_string(&reason).unwrap(), format!("\"{}\"", reason.name()));
+        }
     }
 }

@@ -1,0 +1,107 @@
+//! Which values of a world are believed: those that this arm's sensors could have measured.
+
+use physics_model::Observation;
+use physics_model::sensor::observation_names;
+use scenario::Problem;
+
+use super::WorldError;
+use super::message::wrong;
+
+/// Beyond this an object is not on the table: the range of the published observation, ±m.
+const POSITION_RANGE_M: f64 = 10.0;
+/// No sensor of these arms says more: N, N·m or rad.
+const READING_RANGE: f64 = 1e4;
+/// How far the norm of a quaternion may be from 1.
+const QUATERNION_TOLERANCE: f64 = 0.01;
+/// How far encoders may report beyond the limits of a joint, rad.
+const JOINT_TOLERANCE_RAD: f64 = 0.05;
+/// Turns of a continuous joint that are believed, rad.
+const JOINT_RANGE_RAD: f64 = 1000.0;
+/// How far from `tool_start_m` the tool may start, in lengths of a move.
+const START_TOLERANCE_MOVES: f64 = 1.0;
+
+/// An observation with a unit quaternion of w ≥ 0.
+pub(super) fn observation(
+    request: &'static str,
+    problem: &Problem,
+    mut values: Vec<f64>,
+) -> Result<Observation, WorldError> {
+    let names = observation_names(problem.scenario.sensor.force, problem.model.joint_count());
+    if values.len() != names.len() {
+        let found = format!("expected {} values, found {}", names.len(), values.len());
+        return Err(wrong(request, "observation", &found));
+    }
+    let pose = values.len() - 7;
+    for (i, (value, name)) in values.iter().zip(&names).enumerate() {
+        let limit = match i.checked_sub(pose) {
+            None => READING_RANGE,
+            Some(0..3) => POSITION_RANGE_M,
+            Some(_) => 1.0 + QUATERNION_TOLERANCE,
+        };
+        // Also false for NaN.
+        if !(-limit..=limit).contains(value) {
+            let expectation = format!("expected {name} from -{limit} to {limit}, found {value}");
+            return Err(wrong(request, &format!("observation[{i}]"), &expectation));
+        }
+    }
+    let orientation = &mut values[pose + 3..];
+    let norm = orientation.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if (norm - 1.0).abs() > QUATERNION_TOLERANCE {
+        let field = format!("observation[{}..{}]", pose + 3, pose + 7);
+        return Err(wrong(request, &field, &format!("expected a unit quaternion x, y, z, w, found norm {norm}")));
+    }
+    let scale = if orientation[3] < 0.0 { -1.0 / norm } else { 1.0 / norm };
+    for value in orientation {
+        *value *= scale;
+    }
+    Ok(Observation(values))
+}
+
+/// Joint positions, rad: as reported, or those nearest to `near_rad` that bring the tool to where it is reported.
+pub(super) fn joints(
+    request: &'static str,
+    problem: &Problem,
+    near_rad: &[f64],
+    joints_rad: Option<Vec<f64>>,
+    tool_m: Option<[f64; 3]>,
+) -> Result<Vec<f64>, WorldError> {
+    let joints = match (joints_rad, tool_m) {
+        (Some(joints), None) => joints,
+        (None, Some(tool)) => {
+            let inside = tool.iter().all(|v| (-POSITION_RANGE_M..=POSITION_RANGE_M).contains(v));
+            let joints = if inside { problem.model.joints_for(near_rad, tool) } else { None };
+            return joints.ok_or_else(|| {
+                wrong(request, "tool_m", &format!("expected a point that the arm reaches, found {tool:?}"))
+            });
+        }
+        (Some(_), Some(_)) => return Err(wrong(request, "tool_m", "expected joints_rad or tool_m, found both")),
+        (None, None) => return Err(wrong(request, "joints_rad", "expected joints_rad or tool_m, found neither")),
+    };
+    let limits = problem.model.robot().limits();
+    if joints.len() != limits.len() {
+        let found = format!("expected {} values, found {}", limits.len(), joints.len());
+        return Err(wrong(request, "joints_rad", &found));
+    }
+    for (j, (value, limit)) in joints.iter().zip(limits).enumerate() {
+        let low = limit.lower_rad.max(-JOINT_RANGE_RAD) - JOINT_TOLERANCE_RAD;
+        let high = limit.upper_rad.min(JOINT_RANGE_RAD) + JOINT_TOLERANCE_RAD;
+        if !(low..=high).contains(value) {
+            let expectation = format!("expected {low} to {high} rad, found {value}");
+            return Err(wrong(request, &format!("joints_rad[{j}]"), &expectation));
+        }
+    }
+    Ok(joints)
+}
+
+/// The tool must start where the task says, or every belief begins in another place.
+pub(super) fn start(request: &'static str, problem: &Problem, joints_rad: &[f64]) -> Result<(), WorldError> {
+    let task = &problem.scenario.task;
+    let tool = problem.model.tool_position_m(joints_rad);
+    let off_m = tool.iter().zip(task.tool_start_m).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+    let limit_m = START_TOLERANCE_MOVES * task.step_m;
+    if off_m <= limit_m {
+        return Ok(());
+    }
+    let expectation = format!("expected the tool within {limit_m} m of {:?}, found it at {tool:?}", task.tool_start_m);
+    Err(wrong(request, "joints_rad", &expectation))
+}
