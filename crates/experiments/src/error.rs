@@ -60,4 +60,23 @@ pub enum Error {
         #[source]
         source: agent::Error,
     },
+    /// No world to play in.
+    #[error("trial {trial} of {method}: no world to play it in")]
+    NoWorld {
+        /// Trial.
+        trial: u32,
+        /// Method.
+        method: &'static str,
+        /// Cause.
+        #[source]
+        source: agent::WorldError,
+    },
+    /// A world that was another when the run began.
+    #[error("the world says that it is {found}, when the run began it was {expected}")]
+    OtherWorld {
+        /// Name and version now.
+        found: String,
+        /// Name and version then.
+        expected: String,
+    },
 }

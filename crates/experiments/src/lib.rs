@@ -9,10 +9,12 @@ mod paired;
 mod run;
 mod table;
 mod trial;
+mod worlds;
 
 pub use error::Error;
 pub use interval::wilson95;
 pub use paired::Pair;
 pub use run::{Provenance, Run, RunIdentity};
 pub use table::{Row, Table};
-pub use trial::{TrialRecord, play};
+pub use trial::{TrialRecord, play, play_external};
+pub use worlds::Worlds;

@@ -1,15 +1,16 @@
 //! `cargo xtask eval`: trials of methods on a domain, to a table.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use agent::{Agent, Method};
+use agent::{Agent, Method, Timeouts, WorldAddress};
 use anyhow::{Context as _, Result};
 use clap::Parser;
-use experiments::{Provenance, Run, RunIdentity, play};
+use experiments::{Provenance, Run, RunIdentity, Worlds, play, play_external};
 use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
 use prior::Suggester;
@@ -39,7 +40,20 @@ struct Arguments {
     /// Root seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Worker threads [default: all cores].
+    /// World to play in instead of the simulated one: a command that speaks the world protocol (docs/world-protocol.md) on its
+    /// standard input and output, run without a shell, or tcp://127.0.0.1:PORT.
+    #[arg(long, value_name = "COMMAND|ADDRESS")]
+    world: Option<WorldAddress>,
+    /// How long a world may take to start and say hello, s.
+    #[arg(long, default_value = "60", value_parser = seconds)]
+    world_start_secs: Duration,
+    /// How long a world may take to set up a trial, s.
+    #[arg(long, default_value = "60", value_parser = seconds)]
+    world_reset_secs: Duration,
+    /// How long a world may take for an action, s.
+    #[arg(long, default_value = "60", value_parser = seconds)]
+    world_act_secs: Duration,
+    /// Worker threads, each with a world of its own [default: all cores; 1 with a world behind a socket].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
     /// Small budgets: a run of a minute or two whose figures mean nothing.
@@ -129,6 +143,16 @@ fn run(arguments: &Arguments) -> Result<bool> {
     for method in &methods {
         Agent::new(&problem, *method, prior.as_ref())?;
     }
+    let worlds = match &arguments.world {
+        Some(_) if methods.contains(&Method::Oracle) => return Err(agent::Error::NoTruth.into()),
+        Some(address) => {
+            let (start, reset, act) =
+                (arguments.world_start_secs, arguments.world_reset_secs, arguments.world_act_secs);
+            Some(Worlds::start(address.clone(), Timeouts { start, reset, act }, &problem)?)
+        }
+        None => None,
+    };
+    let world = worlds.as_ref().map(|worlds| worlds.identity().clone());
     let provenance = Provenance {
         run: RunIdentity {
             version: 1,
@@ -137,24 +161,28 @@ fn run(arguments: &Arguments) -> Result<bool> {
             prior_hash: prior.as_ref().map(|p| p.hash().to_string()),
             urdf_hash: scenario.urdf_hash(&root)?,
             commit: scenario::commit(&root),
+            world: world.clone(),
         },
         program: format!("eval {}", env!("CARGO_PKG_VERSION")),
         methods,
         trials: scenario.evaluation.trials,
     };
     let out = arguments.out.clone().unwrap_or_else(|| {
-        let name = format!("{}-{}-{}", scenario.name, scenario.robot.name, scenario.preset);
+        let world = world.map_or_else(String::new, |world| format!("-{}", world.name));
+        let name = format!("{}-{}-{}{world}", scenario.name, scenario.robot.name, scenario.preset);
         root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(name)
     });
     let run = Run::open(&out, provenance, &scenario.to_toml())?;
     if run.resumed() > 0 {
         eprintln!("{} trials are finished already", run.resumed());
     }
-    if !play_missing(&run, &problem, prior.as_ref(), arguments).context(Failed)? {
+    if !play_missing(&run, &problem, prior.as_ref(), worlds.as_ref(), arguments).context(Failed)? {
         return Ok(false);
     }
     let s = &scenario;
-    let table = run.finish(&s.name, &s.robot.name, &s.preset, &s.evaluation.published).context(Failed)?;
+    // The published figures are those of the paper's own simulation.
+    let published = if worlds.is_some() { &BTreeMap::new() } else { &s.evaluation.published };
+    let table = run.finish(&s.name, &s.robot.name, &s.preset, published).context(Failed)?;
     if arguments.json {
         println!("{}", serde_json::to_string(&table)?);
     } else {
@@ -165,7 +193,13 @@ fn run(arguments: &Arguments) -> Result<bool> {
 }
 
 /// Plays what is missing on all threads; false where it was interrupted.
-fn play_missing(run: &Run, problem: &Problem, prior: Option<&Suggester>, arguments: &Arguments) -> Result<bool> {
+fn play_missing(
+    run: &Run,
+    problem: &Problem,
+    prior: Option<&Suggester>,
+    worlds: Option<&Worlds<'_>>,
+    arguments: &Arguments,
+) -> Result<bool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
@@ -174,23 +208,35 @@ fn play_missing(run: &Run, problem: &Problem, prior: Option<&Suggester>, argumen
     let style = "{bar:40} {pos}/{len} trials, {per_sec}, {eta} left {msg}";
     bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
     bar.enable_steady_tick(Duration::from_millis(200));
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build()?;
+    // One robot behind a socket plays one trial at a time.
+    let socket = matches!(arguments.world, Some(WorldAddress::Tcp(_)));
+    let threads = arguments.threads.unwrap_or(u32::from(socket));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build()?;
+    let failed = AtomicBool::new(false);
     let results: Vec<Result<()>> = pool.install(|| {
         missing
             .par_iter()
             .with_max_len(1)
             .map(|&(method, trial)| {
-                if interrupted.load(Ordering::Relaxed) {
+                if interrupted.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
                     return Ok(());
                 }
                 #[expect(clippy::disallowed_methods, reason = "a program may time its trials; nothing depends on it")]
                 let started = std::time::Instant::now();
-                let (mut record, _) = play(problem, method, prior, Seed(arguments.seed), trial)?;
+                let seed = Seed(arguments.seed);
+                let played = match worlds {
+                    Some(worlds) => play_external(problem, method, prior, seed, trial, worlds),
+                    None => play(problem, method, prior, seed, trial),
+                };
+                let (mut record, _) = played.inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
                 record.seconds = started.elapsed().as_secs_f64();
                 run.keep(&record)?;
+                if let Some(failure) = &record.failure {
+                    bar.suspend(|| eprintln!("{} trial {trial}: {failure}", method.name()));
+                }
                 bar.inc(1);
                 if bar.is_hidden() {
-                    let end = format!("{:?}", record.reason).to_lowercase();
+                    let end = record.reason.name();
                     eprintln!(
                         "{} trial {trial}: {end} after {} actions, {:.1} s",
                         method.name(),
@@ -205,6 +251,13 @@ fn play_missing(run: &Run, problem: &Problem, prior: Option<&Suggester>, argumen
     bar.finish_and_clear();
     results.into_iter().collect::<Result<Vec<()>>>()?;
     Ok(!interrupted.load(Ordering::Relaxed))
+}
+
+/// A time-out on the command line.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let good = |secs: &f64| (0.001..=86_400.0).contains(secs);
+    let secs = text.parse::<f64>().ok().filter(good);
+    secs.map(Duration::from_secs_f64).ok_or_else(|| format!("expected 0.001 to 86400 seconds, found `{text}`"))
 }
 
 fn prior_folder(arguments: &Arguments, scenario: &Scenario, root: &Path) -> PathBuf {

@@ -6,7 +6,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
-use agent::Method;
+use agent::{Method, WorldIdentity};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -27,6 +27,8 @@ pub struct RunIdentity {
     pub urdf_hash: String,
     /// Commit of the checkout that the program runs in.
     pub commit: String,
+    /// The world behind `--world`; `None` for our simulated one.
+    pub world: Option<WorldIdentity>,
 }
 
 /// Where results come from: the identity of the run and of the program.
@@ -231,6 +233,7 @@ mod tests {
                 prior_hash: None,
                 urdf_hash: "def".into(),
                 commit: "none".into(),
+                world: None,
             },
             program: "test".into(),
             methods: vec![Method::NoRnn, Method::Heuristic],
@@ -253,6 +256,7 @@ mod tests {
             has_obstacle: false,
             obstacle_touched: false,
             actions: vec![2; 4],
+            failure: None,
             seconds: 0.1,
         }
     }
@@ -302,6 +306,26 @@ mod tests {
         let message = Run::open(folder.path(), provenance(2), "second").unwrap_err().to_string();
         assert!(message.contains("run.json") && message.contains("`seed` is 1, this run has 2"), "{message}");
         assert_eq!(std::fs::read_to_string(folder.path().join("scenario.toml")).unwrap(), "first");
+    }
+
+    #[test]
+    fn a_folder_of_another_world_is_refused_both_ways() {
+        let world = |version: &str| {
+            let identity = WorldIdentity { address: "arm".into(), name: "arm".into(), version: version.into() };
+            let ours = provenance(1);
+            Provenance { run: RunIdentity { world: Some(identity), ..ours.run }, ..ours }
+        };
+        let runs = [provenance(1), world("1"), world("2")];
+        for (first, one) in runs.iter().enumerate() {
+            let folder = tempfile::tempdir().unwrap();
+            drop(Run::open(folder.path(), one.clone(), "").unwrap());
+            for (second, other) in runs.iter().enumerate() {
+                let opened = Run::open(folder.path(), other.clone(), "");
+                let message = opened.err().map(|error| error.to_string());
+                assert_eq!(message.is_none(), first == second, "{message:?}");
+                assert!(message.is_none_or(|message| message.contains("`world`")));
+            }
+        }
     }
 
     #[test]

@@ -118,11 +118,8 @@ impl Table {
         );
         for row in &self.rows {
             let published = row.published.map_or("–".into(), |p| format!("{}/{}", p.successes, p.trials));
-            let reasons: Vec<String> = row
-                .reasons
-                .iter()
-                .map(|(reason, count)| format!("{} {count}", format!("{reason:?}").to_lowercase()))
-                .collect();
+            let reasons: Vec<String> =
+                row.reasons.iter().map(|(reason, count)| format!("{} {count}", reason.name())).collect();
             let steps = row.mean_steps_to_goal.map_or("–".into(), |s| format!("{s:.1}"));
             // Writing to a string cannot fail.
             let _ = writeln!(

@@ -6,7 +6,7 @@ use prior::Suggester;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
-use crate::Error;
+use crate::{Error, Worlds};
 
 /// What is kept of a trial: one line of `trials.jsonl`. All but `seconds` is a function of scenario, method, trial and seed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,12 +32,15 @@ pub struct TrialRecord {
     pub transitions: usize,
     /// Actions with a force above the limit.
     pub large_forces: usize,
-    /// The world has an obstacle.
+    /// The world has an obstacle; false where an external one does not say.
     pub has_obstacle: bool,
     /// The object or the tool pushed against it.
     pub obstacle_touched: bool,
     /// Actions taken, by index.
     pub actions: Vec<u8>,
+    /// What the world did wrong, where that ended the trial.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
     /// Wall-clock time, s.
     pub seconds: f64,
 }
@@ -63,7 +66,42 @@ pub fn play(
     let has_obstacle = start.theta.obstacle.is_some();
     let mut world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
     let episode = Agent::new(problem, method, prior).and_then(|mut a| a.run(&mut world, seed)).map_err(failed)?;
-    let record = TrialRecord {
+    Ok((record(method, trial, seed, has_obstacle, &episode), episode))
+}
+
+/// The same in an external world, which is asked for the scene of the trial. A world that fails ends the trial with a record, and the next
+/// trial gets a fresh one.
+///
+/// # Errors
+///
+/// [`Error::NoWorld`] and [`Error::OtherWorld`] where none can be had; [`Error::Trial`] where the method cannot be played.
+pub fn play_external(
+    problem: &Problem,
+    method: Method,
+    prior: Option<&Suggester>,
+    root: Seed,
+    trial: u32,
+    worlds: &Worlds<'_>,
+) -> Result<(TrialRecord, Episode), Error> {
+    let failed = |source: agent::Error| Error::Trial { trial, method: method.name(), source };
+    let seed = root.child(Purpose::World, u64::from(trial));
+    let mut agent = Agent::new(problem, method, prior).map_err(failed)?;
+    let mut world = worlds.take(method, trial)?;
+    let mut scene = world.episode(problem, trial, seed.0);
+    let episode = match agent.run(&mut scene, seed) {
+        // What it first measured cannot be: an object inside the tool, for example.
+        Err(agent::Error::Scenario(error)) => Episode::failed(format!("the first observation and the task: {error}")),
+        played => played.map_err(failed)?,
+    };
+    let has_obstacle = scene.has_obstacle().unwrap_or(false);
+    if episode.failure.is_none() {
+        worlds.give_back(world);
+    }
+    Ok((record(method, trial, seed, has_obstacle, &episode), episode))
+}
+
+fn record(method: Method, trial: u32, seed: Seed, has_obstacle: bool, episode: &Episode) -> TrialRecord {
+    TrialRecord {
         method,
         trial,
         seed: seed.0,
@@ -77,7 +115,7 @@ pub fn play(
         has_obstacle,
         obstacle_touched: episode.steps.iter().any(|s| s.obstacle_touched),
         actions: episode.steps.iter().map(|s| s.action.into()).collect(),
+        failure: episode.failure.clone(),
         seconds: 0.0,
-    };
-    Ok((record, episode))
+    }
 }
