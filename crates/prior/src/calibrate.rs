@@ -25,8 +25,8 @@ pub struct Episode<'a> {
     pub sequence: &'a Sequence,
     /// First step whose observation follows a contact of the tool; none if there was none.
     pub contact: Option<usize>,
-    /// Whether the tool or the object touched the obstacle.
-    pub obstacle_touched: bool,
+    /// First step whose observation follows a touch of the obstacle, by the tool or by the object.
+    pub obstacle_contact: Option<usize>,
 }
 
 /// What is compared.
@@ -79,15 +79,18 @@ pub fn calibrate(
     Calibration {
         episodes: episodes.len(),
         steps: total.count,
-        nll: total.nll.network,
-        baseline_nll: total.nll.baseline,
+        nll: total.nll.network.unwrap_or(f64::NAN),
+        baseline_nll: total.nll.baseline.unwrap_or(f64::NAN),
         memoryless_nll: total.nll.memoryless,
-        parameters: (0..width).map(|target| rank(layout, &runs, target)).collect(),
+        parameters: (0..width).map(|target| rank(layout, &runs, episodes, target)).collect(),
         static_targets: layout.continuous[static_columns].to_vec(),
         shape_accuracy: classes.first().map(|report| report.last_accuracy),
         obstacle_after_contact_accuracy: obstacles.found,
         obstacle_contact_episodes: obstacles.touched,
         no_obstacle_accuracy: obstacles.denied,
+        obstacle_balanced_accuracy: obstacles.found.zip(obstacles.denied).map(|(found, denied)| 0.5 * (found + denied)),
+        untouched_obstacle_found: obstacles.untouched,
+        obstacle_found_since_touch: obstacles.since,
         classes,
         sharpening: sharpening(&runs, episodes),
     }
@@ -163,8 +166,8 @@ impl What<'_> {
             |(Target { labels, stddev }, applies, target)| applies.then(|| mixture.stddev(target, labels) / stddev),
         );
         let likelihoods = |mask: &[bool]| Likelihoods {
-            network: -mixture.log_density_masked(&values, mask, &truth),
-            baseline: -baseline.log_density(&values, mask, labels),
+            network: Some(-mixture.log_density_masked(&values, mask, &truth)),
+            baseline: Some(-baseline.log_density(&values, mask, labels)),
             memoryless: memoryless.map(|memoryless| -memoryless.log_density_masked(&values, mask, &truth)),
         };
         let statics: Vec<bool> = mask.iter().enumerate().map(|(i, &m)| m && self.static_columns.contains(&i)).collect();
@@ -187,8 +190,8 @@ fn score<'a>(records: impl Iterator<Item = &'a Record>) -> Score {
     let records: Vec<&Record> = records.collect();
     let average = |of: &dyn Fn(&Record) -> Option<f64>| mean(records.iter().filter_map(|record| of(record)));
     let likelihoods = |of: &dyn Fn(&Record) -> Likelihoods| Likelihoods {
-        network: average(&|record| Some(of(record).network)).unwrap_or(0.0),
-        baseline: average(&|record| Some(of(record).baseline)).unwrap_or(0.0),
+        network: average(&|record| of(record).network),
+        baseline: average(&|record| of(record).baseline),
         memoryless: average(&|record| of(record).memoryless),
     };
     let (statics, kinds) = records.first().map_or((0, 0), |first| (first.spread.len(), first.classes.len()));
@@ -225,22 +228,34 @@ struct Obstacles {
     found: Option<f64>,
     touched: usize,
     denied: Option<f64>,
+    untouched: Option<f64>,
+    since: Vec<f64>,
 }
 
 fn obstacles(runs: &[Vec<Record>], episodes: &[Episode<'_>], none: Option<(usize, usize)>) -> Obstacles {
     let ends = || runs.iter().zip(episodes).filter_map(|(records, episode)| Some((records.last()?, episode)));
-    let touched = || ends().filter(|(_, episode)| episode.obstacle_touched);
-    let absent = ends().filter(|(last, _)| none.is_some_and(|(target, label)| last.classes[target].0 == label));
+    let touched = || ends().filter(|(_, episode)| episode.obstacle_contact.is_some());
+    let is_absent = |last: &Record| none.is_some_and(|(target, label)| last.classes[target].0 == label);
+    let absent = ends().filter(|(last, _)| is_absent(last));
+    let untouched = ends().filter(|(last, episode)| !is_absent(last) && episode.obstacle_contact.is_none());
+    let since = |step: usize| -> Vec<f64> {
+        let at = runs.iter().zip(episodes).filter_map(|(records, e)| records.get(e.obstacle_contact? + step));
+        at.map(|record| f64::from(u8::from(record.none < 0.5))).collect()
+    };
+    let count = touched().count();
+    let since = (0..).map(since).take_while(|found| none.is_some() && !found.is_empty() && 2 * found.len() >= count);
     let share = |right: bool| f64::from(u8::from(right));
     Obstacles {
         found: none.and_then(|_| mean(touched().map(|(last, _)| share(last.none < 0.5)))),
         touched: none.map_or(0, |_| touched().count()),
         denied: mean(absent.map(|(last, _)| share(last.none > 0.5))),
+        untouched: none.and_then(|_| mean(untouched.map(|(last, _)| share(last.none < 0.5)))),
+        since: since.filter_map(|found| mean(found.into_iter())).collect(),
     }
 }
 
 /// Coverage and histogram of one continuous target.
-fn rank(layout: &Layout, runs: &[Vec<Record>], target: usize) -> ParameterReport {
+fn rank(layout: &Layout, runs: &[Vec<Record>], of: &[Episode<'_>], target: usize) -> ParameterReport {
     let mut ranks = vec![0; BINS];
     let (mut count, mut inside50, mut inside90) = (0, 0, 0_usize);
     // Steps and steps inside the 90 % interval of each episode.
@@ -260,6 +275,15 @@ fn rank(layout: &Layout, runs: &[Vec<Record>], target: usize) -> ParameterReport
     }
     let share = |inside: usize| inside as f64 / (count as f64).max(1.0);
     let coverage90 = share(inside90);
+    let coverage = |part: &dyn Fn(&Episode<'_>, usize, usize) -> bool| {
+        let inside = runs.iter().zip(of).flat_map(|(records, episode)| {
+            let steps = records.iter().enumerate();
+            let chosen = steps.filter(move |(step, _)| part(episode, *step, records.len()));
+            chosen.filter_map(|(_, record)| record.ranks[target])
+        });
+        mean(inside.map(|rank| f64::from(u8::from((rank - 0.5).abs() <= 0.45))))
+    };
+    let after = |episode: &Episode<'_>, step: usize| episode.contact.is_some_and(|at| at <= step);
     // Of a ratio of sums over independent episodes (Cochran 1977, section 6.3).
     let squares: f64 = episodes.iter().map(|(steps, inside)| (inside - coverage90 * steps).powi(2)).sum();
     ParameterReport {
@@ -269,6 +293,12 @@ fn rank(layout: &Layout, runs: &[Vec<Record>], target: usize) -> ParameterReport
         coverage50: share(inside50),
         coverage90,
         coverage90_stderr: squares.sqrt() / (count as f64).max(1.0),
+        coverage90_before_contact: coverage(&|episode, step, _| !after(episode, step)),
+        coverage90_after_contact: coverage(&|episode, step, _| after(episode, step)),
+        coverage90_last: coverage(&|_, step, steps| step + 1 == steps),
+        coverage90_last_touched: coverage(&|episode, step, steps| {
+            step + 1 == steps && episode.obstacle_contact.is_some()
+        }),
         ranks,
     }
 }

@@ -117,10 +117,25 @@ impl Checkpoint {
             let reason = format!("{} and {} scales do not fit the layout", scales.0, scales.1);
             return Err(Error::Format { path, reason });
         }
+        let refuse = |reason: String| Err(Error::Format { path: path.clone(), reason });
+        let normalisation = &manifest.normalisation;
+        let mut scales = normalisation.observation.iter().chain(&normalisation.continuous);
+        if let Some(scale) = scales.find(|scale| !scale.is_usable()) {
+            return refuse(format!(
+                "normalisation holds {scale:?}, expected a finite mean and a finite stddev above 0"
+            ));
+        }
+        if let Err(reason) = manifest.baseline.check(&manifest.layout) {
+            return refuse(reason);
+        }
         let bytes = files::read_blob(dir, &manifest.weights)?;
         let weights = dir.join(&manifest.weights.name);
+        let parameters = files::from_safetensors(&bytes, &dimensions.tensors(), &weights)?;
+        if parameters.tensors.iter().flatten().any(|weight| !weight.is_finite()) {
+            return Err(Error::Format { path: weights, reason: "holds a weight that is not finite".into() });
+        }
         Ok(Self {
-            parameters: files::from_safetensors(&bytes, &dimensions.tensors(), &weights)?,
+            parameters,
             layout: manifest.layout,
             network: manifest.network,
             normalisation: manifest.normalisation,
@@ -193,6 +208,25 @@ mod tests {
         let message = load();
         assert!(message.contains("blake3 is") && message.contains("damaged or replaced"), "{message}");
         fs::write(&weights, bytes).unwrap();
+
+        // Numbers that JSON can hold and a network cannot use.
+        let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
+        type Case = (&'static str, serde_json::Value, &'static str);
+        let edits: [Case; 6] = [
+            ("/normalisation/continuous/0/stddev", 0.0.into(), "stddev above 0"),
+            ("/normalisation/observation/1/stddev", (-1.0).into(), "stddev above 0"),
+            ("/baseline/structures", serde_json::json!([0.5]), "structures and the targets of the layout"),
+            ("/baseline/continuous", serde_json::json!([]), "structures and the targets of the layout"),
+            ("/baseline/labels", serde_json::json!([3, 99]), "structures and the targets of the layout"),
+            ("/network/hidden/0", (1_u64 << 62).into(), "at most 65536 each"),
+        ];
+        for (pointer, value, expected) in edits {
+            let mut edited = manifest.clone();
+            *edited.pointer_mut(pointer).unwrap() = value;
+            fs::write(&json, edited.to_string()).unwrap();
+            let message = load();
+            assert!(message.contains(expected), "{pointer}: {message}");
+        }
 
         fs::write(&json, &text[..text.len() / 2]).unwrap();
         let message = load();

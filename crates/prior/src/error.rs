@@ -17,6 +17,28 @@ pub enum Error {
         #[source]
         source: std::io::Error,
     },
+    /// A dataset of another task.
+    #[error("dataset: schema.{key} is {found}, expected {expected}")]
+    Schema {
+        /// Key of the schema.
+        key: &'static str,
+        /// What it holds.
+        found: String,
+        /// What this task has.
+        expected: String,
+    },
+    /// A shape that does not exist.
+    #[error("dataset: {name} of episode {episode} is class {found}, expected one of 0 to {}", labels - 1)]
+    Class {
+        /// Episode.
+        episode: u64,
+        /// Class target.
+        name: String,
+        /// Its class.
+        found: u8,
+        /// Number of its labels.
+        labels: usize,
+    },
     /// A JSON file that does not parse (truncated, or keys that this version does not know).
     #[error("{}: not a readable {kind} file (truncated or edited?)", path.display())]
     Json {

@@ -13,7 +13,7 @@
 use dataset::{Episode, Schema};
 use physics_model::action::ACTION_COUNT;
 use physics_model::sensor::observation_names;
-use physics_model::state::{BODY_LEN, State};
+use physics_model::state::{BODY_LEN, MAX_JOINTS, State};
 use physics_model::theta::{CLASS_TARGETS, NO_OBSTACLE, THETA_LEN, THETA_NAMES};
 use physics_model::{Action, BodyState, ObjectShape, Particle, PushModel, Theta};
 use pomdp::{Purpose, Seed};
@@ -21,7 +21,7 @@ use rand::RngExt as _;
 use rand_distr::StandardNormal;
 
 use crate::mixture::Draw;
-use crate::{ClassTarget, Layout, Sequence, Transform};
+use crate::{ClassTarget, Error, Layout, Sequence, Transform};
 
 /// A suggested body that leans less than this stands upright, rad.
 const UPRIGHT_TOLERANCE_RAD: f64 = 0.3;
@@ -81,9 +81,29 @@ pub fn layout(robot: &str, model: &PushModel, input: ActionInput) -> Layout {
 }
 
 /// What a prior trained on a dataset of this schema takes in and gives out.
-#[must_use]
-pub fn layout_of_dataset(schema: &Schema, input: ActionInput) -> Layout {
-    from_names(&schema.robot, schema.observation.clone(), schema.state.clone(), schema.theta.clone(), input)
+///
+/// # Errors
+///
+/// [`Error::Schema`] where the dataset is not one of this task: another Θ, other classes, another state or number of actions.
+pub fn layout_of_dataset(schema: &Schema, input: ActionInput) -> Result<Layout, Error> {
+    let joints = schema.state.len().checked_sub(2 * BODY_LEN).filter(|joints| (1..=MAX_JOINTS).contains(joints));
+    let state = joints.map(State::names).unwrap_or_default();
+    let names = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let expected = [
+        ("state", &schema.state, state),
+        ("theta", &schema.theta, names(&THETA_NAMES)),
+        ("classes", &schema.classes, names(&CLASS_TARGETS.map(|(name, _)| name))),
+    ];
+    for (key, found, expected) in expected {
+        if found.is_empty() || *found != expected {
+            return Err(Error::Schema { key, found: found.join(", "), expected: expected.join(", ") });
+        }
+    }
+    if schema.action_count != ACTION_COUNT {
+        let (found, expected) = (schema.action_count.to_string(), ACTION_COUNT.to_string());
+        return Err(Error::Schema { key: "action_count", found, expected });
+    }
+    Ok(from_names(&schema.robot, schema.observation.clone(), schema.state.clone(), schema.theta.clone(), input))
 }
 
 /// The continuous targets that stay the same in an episode: Θ.
@@ -177,11 +197,20 @@ fn from_names(
 
 /// A recorded episode as a training sequence. The noise of the resolution depends on the episode's number alone.
 ///
+/// # Errors
+///
+/// [`Error::Class`] for a shape that does not exist.
+///
 /// # Panics
 ///
 /// If the episode's columns are not those of [`layout_of_dataset`].
-#[must_use]
-pub fn sequence(layout: &Layout, episode: &Episode) -> Sequence {
+pub fn sequence(layout: &Layout, episode: &Episode) -> Result<Sequence, Error> {
+    for (target, &found) in layout.classes.iter().zip(&episode.classes) {
+        if usize::from(found) >= target.labels.len() {
+            let name = target.name.clone();
+            return Err(Error::Class { episode: episode.episode, name, found, labels: target.labels.len() });
+        }
+    }
     let action_input = ActionInput::of(layout);
     let mut rng = Seed(0).stream(Purpose::Resolution, episode.episode);
     let steps = episode.rows();
@@ -214,7 +243,7 @@ pub fn sequence(layout: &Layout, episode: &Episode) -> Sequence {
         sequence.observations.extend(action_input.columns(action).map(|v| v as f32));
         sequence.classes.extend(&episode.classes);
     }
-    sequence
+    Ok(sequence)
 }
 
 /// Resolution of every value of a state.
@@ -318,7 +347,7 @@ mod tests {
     #[test]
     fn what_does_not_apply_is_masked() {
         let layout = layout(ActionInput::Off);
-        let count = |classes| sequence(&layout, &episode(classes)).mask.iter().sum::<f32>() / 2.0;
+        let count = |classes| sequence(&layout, &episode(classes)).unwrap().mask.iter().sum::<f32>() / 2.0;
         // 7 joints, 13 object, 5 + 3 of a box, 13 obstacle, 1 + 2 of a cylinder.
         assert_eq!(count([0, 1]), 7.0 + 13.0 + 8.0 + 13.0 + 3.0);
         // Sphere without obstacle: mass, depth of the centre of mass, friction, radius.
@@ -328,7 +357,7 @@ mod tests {
     #[test]
     fn a_target_comes_back_as_the_particle_it_was_made_from() {
         let (layout, episode) = (layout(ActionInput::Off), episode([0, 1]));
-        let sequence = sequence(&layout, &episode);
+        let sequence = sequence(&layout, &episode).unwrap();
         assert!((f64::from(sequence.targets[33]) - 0.5_f64.ln()).abs() < 1e-6, "a mass is learnt as its logarithm");
         let values: Vec<f64> = sequence.targets[..45].iter().map(|v| f64::from(*v)).collect();
         let draw = Draw { values, classes: vec![0, 1], component: 0 };
@@ -363,7 +392,7 @@ mod tests {
             for row in 0..2 {
                 episode.observation[row * 20 + 13] = 0.5;
             }
-            let sequence = sequence(&layout, &episode);
+            let sequence = sequence(&layout, &episode).unwrap();
             squares += sequence.targets.iter().skip(7).step_by(45).map(|v| f64::from(*v).powi(2)).sum::<f64>();
         }
         assert!(((squares / 800.0).sqrt() / 0.001 - 1.0).abs() < 0.1, "{squares}");
@@ -372,13 +401,44 @@ mod tests {
     #[test]
     fn actions_are_one_hot_columns_behind_the_observation() {
         let layout = layout(ActionInput::OneHot);
-        let sequence = sequence(&layout, &episode([0, 1]));
+        let sequence = sequence(&layout, &episode([0, 1])).unwrap();
         assert_eq!(sequence.observations.len(), 2 * 30);
         assert!(sequence.observations[20..30].iter().all(|v| *v == 0.0), "no action has led to the first row");
         let second: Vec<f64> = sequence.observations[30..].iter().map(|v| f64::from(*v)).collect();
         assert_eq!(second[20..], [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(input(&layout, Some(Action::ALL[2]), &second[..20]), second);
         assert_eq!(input(&self::layout(ActionInput::Off), Some(Action::ALL[2]), &second[..20]), second[..20]);
+    }
+
+    #[test]
+    fn a_dataset_of_another_task_is_refused_by_its_key() {
+        let names = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+        let good = Schema {
+            robot: "sawyer".into(),
+            observation: observation_names(ForceSensing::Wrist, 7),
+            action_count: ACTION_COUNT,
+            state: State::names(7),
+            theta: names(&THETA_NAMES),
+            classes: names(&["object_shape", "obstacle_shape"]),
+            events: vec![],
+        };
+        assert_eq!(layout_of_dataset(&good, ActionInput::Off).unwrap(), layout(ActionInput::Off));
+        type Case = (&'static str, fn(&mut Schema));
+        let bad: [Case; 5] = [
+            ("state", |s| s.state.truncate(20)),
+            ("state", |s| s.state.swap(0, 1)),
+            ("theta", |s| s.theta.truncate(11)),
+            ("classes", |s| s.classes.clear()),
+            ("action_count", |s| s.action_count = 4),
+        ];
+        for (key, change) in bad {
+            let mut schema = good.clone();
+            change(&mut schema);
+            let message = layout_of_dataset(&schema, ActionInput::Off).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("dataset: schema.{key} is ")), "{message}");
+        }
+        let message = sequence(&layout(ActionInput::Off), &episode([0, 4])).unwrap_err().to_string();
+        assert_eq!(message, "dataset: obstacle_shape of episode 0 is class 4, expected one of 0 to 3");
     }
 
     #[test]

@@ -121,8 +121,9 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     let recorded = reader.episodes()?;
     let input = if arguments.action_input { ActionInput::OneHot } else { ActionInput::Off };
-    let layout = features::layout_of_dataset(&manifest.schema, input);
-    let sequences: Vec<Sequence> = recorded.iter().map(|episode| features::sequence(&layout, episode)).collect();
+    let layout = features::layout_of_dataset(&manifest.schema, input)?;
+    let sequences: Vec<Sequence> =
+        recorded.iter().map(|episode| features::sequence(&layout, episode)).collect::<Result<_, _>>()?;
     drop(recorded);
     let config = TrainConfig {
         network: NetworkConfig { hidden: vec![128, 128], components: 10, memory: !arguments.memoryless },

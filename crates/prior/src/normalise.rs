@@ -23,6 +23,11 @@ pub struct Scale {
 }
 
 impl Scale {
+    /// Whether values can be shifted and scaled by it.
+    pub(crate) fn is_usable(&self) -> bool {
+        self.mean.is_finite() && self.stddev.is_finite() && self.stddev > 0.0
+    }
+
     /// Median and interquartile range (as the standard deviation of the Gaussian that has it): the scale of what is usual, where a
     /// blocked push reads a hundred times the force of a free one. A column of which three quarters are equal falls back on
     /// [`Scale::fit`].

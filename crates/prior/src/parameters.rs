@@ -5,6 +5,9 @@ use pomdp::{Purpose, Seed};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
+/// Largest width of a layer, and most components: beyond it sizes would overflow before memory does.
+const LARGEST: usize = 1 << 16;
+
 /// Shape of the network. The paper: two layers of 128, 10 components.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -70,6 +73,10 @@ impl Dimensions {
                 format!("{:?}", config.hidden),
                 "at least one layer, each at least 1 wide",
             );
+        }
+        if config.hidden.iter().any(|&width| width > LARGEST) || config.components > LARGEST {
+            let found = format!("{:?} and {} components", config.hidden, config.components);
+            return refuse("network", found, "at most 65536 each");
         }
         if config.components == 0 {
             return refuse("network.components", "0".into(), "at least 1");

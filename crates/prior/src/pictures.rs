@@ -61,9 +61,9 @@ fn likelihood(robot: &str, report: &Calibration) -> Figure {
             steps.filter_map(|r| Some((r.step as f64, model(&of(&r.since_contact))?))).collect()
         };
         let series = [
-            ("network", points(|l| Some(l.network)), Stroke::Marked),
+            ("network", points(|l| l.network), Stroke::Marked),
             ("network without memory", points(|l| l.memoryless), Stroke::Solid),
-            ("sampling distribution", points(|l| Some(l.baseline)), Stroke::Dashed),
+            ("sampling distribution", points(|l| l.baseline), Stroke::Dashed),
         ];
         let series = series.into_iter().filter(|(_, points, _)| !points.is_empty());
         let lines = Lines {
@@ -136,6 +136,10 @@ fn coverage(robot: &str, report: &Calibration) -> Figure {
         value: Axis { limits: Some((0.3, 1.0)), ..Axis::new("share of the truths inside") },
         series: vec![
             estimates("90 % interval, ± 2 standard errors", within),
+            estimates("90 %, last step", |p| p.coverage90_last.map_or_else(Estimate::missing, Estimate::exact)),
+            estimates("90 %, last step, obstacle touched", |p| {
+                p.coverage90_last_touched.map_or_else(Estimate::missing, Estimate::exact)
+            }),
             estimates("50 % interval", |p| Estimate::exact(p.coverage50)),
         ],
         references: vec![

@@ -194,6 +194,9 @@ impl Trainer {
             (norms, batches) = (norms + done.norm, batches + 1);
         }
         let held_out_nll = self.held_out_nll();
+        if !held_out_nll.is_finite() {
+            return Err(Error::Diverged { epoch, step: self.steps as usize, norm: held_out_nll });
+        }
         let best = self.curve.last().map(|last| (last.best_epoch, last.best_held_out_nll));
         let (best_epoch, best_held_out_nll) = match best {
             Some((best_epoch, best_nll)) if best_nll <= held_out_nll => (best_epoch, best_nll),

@@ -79,8 +79,9 @@ impl Problem {
     /// The dataset in `dir`.
     pub(crate) fn recorded(dir: &Path) -> Result<Self> {
         let reader = Reader::open(dir).with_context(|| format!("{}: no usable dataset", dir.display()))?;
-        let layout = features::layout_of_dataset(&reader.manifest().schema, ActionInput::Off);
-        let data = reader.episodes()?.iter().map(|episode| features::sequence(&layout, episode)).collect();
+        let layout = features::layout_of_dataset(&reader.manifest().schema, ActionInput::Off)?;
+        let data =
+            reader.episodes()?.iter().map(|episode| features::sequence(&layout, episode)).collect::<Result<_, _>>()?;
         Ok(Self { layout, data, config: published(0.1, Some(10.0)) })
     }
 

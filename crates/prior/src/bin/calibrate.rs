@@ -8,7 +8,7 @@ use clap::Parser;
 use dataset::Reader;
 use prior::calibrate::{Calibration, calibrate};
 use prior::features::{self, ActionInput};
-use prior::{Checkpoint, Episode, Models, Sequence, write_atomically};
+use prior::{Checkpoint, Episode, Models, Sequence, TrainConfig, write_atomically};
 
 /// Compares what a prior says with the truth of episodes that it was not trained on.
 #[derive(Debug, Parser)]
@@ -17,7 +17,7 @@ struct Arguments {
     /// Arm: sawyer or jaco.
     #[arg(long, default_value = "sawyer")]
     robot: String,
-    /// Folder of the prior [default: assets/priors/ROBOT].
+    /// Folder of the prior [default: the one trained here, runs/priors/ROBOT, else the shipped one].
     #[arg(long)]
     prior: Option<PathBuf>,
     /// Folder of a dataset made with another seed than the training data [default: runs/held-out/ROBOT].
@@ -56,7 +56,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         None => prior::project_root(&std::env::current_dir()?),
     };
     let robot = &arguments.robot;
-    let folder = arguments.prior.clone().unwrap_or_else(|| root.join("assets/priors").join(robot));
+    let trained = root.join("runs/priors").join(robot);
+    let default = if trained.join("prior.json").is_file() { trained } else { root.join("assets/priors").join(robot) };
+    let folder = arguments.prior.clone().unwrap_or(default);
     let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(robot));
     let out = arguments.out.clone().unwrap_or_else(|| folder.clone());
     rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
@@ -69,8 +71,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         )
     })?;
     let manifest = reader.manifest();
-    let layout = features::layout_of_dataset(&manifest.schema, ActionInput::of(&checkpoint.layout));
-    checkpoint.layout.check(&layout, &folder.join("prior.json"))?;
+    let layout = features::layout_of_dataset(&manifest.schema, ActionInput::of(&checkpoint.layout))?;
+    let manifest_file = folder.join("prior.json");
+    checkpoint.layout.check(&layout, &manifest_file)?;
     if checkpoint.provenance.get("dataset_seed") == Some(&manifest.seed.to_string()) {
         return Err(anyhow!(
             "{}: seed is {}, that of the data the prior was trained on, expected another: its worlds are not held out",
@@ -81,15 +84,28 @@ fn run(arguments: &Arguments) -> Result<()> {
     let memoryless = match &arguments.memoryless {
         Some(folder) => {
             let memoryless = Checkpoint::load(folder, Some(&layout))?;
+            let file = folder.join("prior.json");
             if memoryless.network.memory {
-                return Err(anyhow!("{}: network.memory is true, expected false", folder.join("prior.json").display()));
+                return Err(anyhow!("{}: network.memory is true, expected false", file.display()));
+            }
+            // A peer: the same but for its memory.
+            let (ours, theirs) = (&checkpoint.facts, &memoryless.facts);
+            let network = ours.config.network.clone();
+            let config = TrainConfig { network, ..theirs.config.clone() };
+            if ours.data_blake3 != theirs.data_blake3 || ours.seed != theirs.seed || ours.config != config {
+                return Err(anyhow!(
+                    "{}: was trained on other data, with another seed or other settings, expected those of {}",
+                    file.display(),
+                    manifest_file.display()
+                ));
             }
             Some(memoryless.inference()?)
         }
         None => None,
     };
     let recorded = reader.episodes()?;
-    let sequences: Vec<Sequence> = recorded.iter().map(|episode| features::sequence(&layout, episode)).collect();
+    let sequences: Vec<Sequence> =
+        recorded.iter().map(|episode| features::sequence(&layout, episode)).collect::<Result<_, _>>()?;
     let first = |episode: &dataset::Episode, event| features::first_event(&manifest.schema, episode, event);
     let episodes: Vec<Episode<'_>> = recorded
         .iter()
@@ -97,7 +113,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         .map(|(episode, sequence)| Episode {
             sequence,
             contact: first(episode, "tool_touched"),
-            obstacle_touched: first(episode, "obstacle_touched").is_some(),
+            obstacle_contact: first(episode, "obstacle_touched"),
         })
         .collect();
     let inference = checkpoint.inference()?;
@@ -125,11 +141,20 @@ fn print(calibration: &Calibration) {
     if let Some(memoryless) = calibration.memoryless_nll {
         println!("the same network without memory: {memoryless:.2}");
     }
-    println!("\n{:<20} {:>8} {:>8} {:>8} {:>8}", "parameter", "episodes", "50 %", "90 %", "±");
+    println!(
+        "\n{:<20} {:>8} {:>7} {:>7} {:>6} {:>9} {:>8}",
+        "parameter", "episodes", "50 %", "90 %", "±", "90 % last", "touched"
+    );
     for parameter in calibration.parameters.iter().filter(|p| calibration.static_targets.contains(&p.name)) {
         println!(
-            "{:<20} {:>8} {:>8.3} {:>8.3} {:>8.3}",
-            parameter.name, parameter.episodes, parameter.coverage50, parameter.coverage90, parameter.coverage90_stderr
+            "{:<20} {:>8} {:>7.3} {:>7.3} {:>6.3} {:>9.3} {:>8.3}",
+            parameter.name,
+            parameter.episodes,
+            parameter.coverage50,
+            parameter.coverage90,
+            parameter.coverage90_stderr,
+            parameter.coverage90_last.unwrap_or(f64::NAN),
+            parameter.coverage90_last_touched.unwrap_or(f64::NAN),
         );
     }
     println!();
@@ -145,6 +170,9 @@ fn print(calibration: &Calibration) {
         println!(
             "obstacle found in {found:.3} of {touched} episodes that touched it, denied in {denied:.3} without one"
         );
+        let since: Vec<String> = calibration.obstacle_found_since_touch.iter().map(|f| format!("{f:.2}")).collect();
+        let untouched = calibration.untouched_obstacle_found.unwrap_or(f64::NAN);
+        println!("by steps since the touch: {}; of those that nothing touched {untouched:.3}", since.join(" "));
     }
     println!("\nsteps since the first contact, nats of Θ: network, sampling distribution, without memory");
     for report in calibration.sharpening.iter().filter(|r| r.since_contact.count > 0) {
@@ -152,7 +180,10 @@ fn print(calibration: &Calibration) {
         let memoryless = score.static_nll.memoryless.map_or(String::new(), |nll| format!("{nll:>8.2}"));
         println!(
             "{:>4} {:>7} {:>8.2} {:>8.2} {memoryless}",
-            report.step, score.count, score.static_nll.network, score.static_nll.baseline
+            report.step,
+            score.count,
+            score.static_nll.network.unwrap_or(f64::NAN),
+            score.static_nll.baseline.unwrap_or(f64::NAN)
         );
     }
 }

@@ -65,6 +65,23 @@ impl Baseline {
         }
     }
 
+    /// Whether it belongs to `layout` and has densities; otherwise the reason why not.
+    pub(crate) fn check(&self, layout: &Layout) -> Result<(), String> {
+        let labels: Vec<usize> = layout.classes.iter().map(|target| target.labels.len()).collect();
+        let structures: usize = labels.iter().product();
+        let shape = (self.labels == labels, self.structures.len(), self.continuous.len());
+        if shape != (true, structures, structures) || self.continuous.iter().any(|c| c.len() != layout.continuous.len())
+        {
+            return Err(format!("baseline does not have the {structures} structures and the targets of the layout"));
+        }
+        if !self.structures.iter().all(|share| *share > 0.0 && *share <= 1.0)
+            || !self.continuous.iter().flatten().all(Scale::is_usable)
+        {
+            return Err("baseline holds a share outside (0, 1] or a scale without a finite spread above 0".into());
+        }
+        Ok(())
+    }
+
     /// ln p(values, classes); values whose mask is false do not count.
     #[must_use]
     pub fn log_density(&self, values: &[f64], mask: &[bool], classes: &[u8]) -> f64 {

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Likelihoods {
-    /// The network.
-    pub network: f64,
-    /// The sampling distribution: what is known without any observation.
-    pub baseline: f64,
+    /// The network; null over no steps.
+    pub network: Option<f64>,
+    /// The sampling distribution; null over no steps.
+    pub baseline: Option<f64>,
     /// The same network trained without memory, where one was given.
     pub memoryless: Option<f64>,
 }
@@ -62,6 +62,14 @@ pub struct ParameterReport {
     pub coverage90: f64,
     /// Standard error of `coverage90`, from the spread of the episodes' shares.
     pub coverage90_stderr: f64,
+    /// Coverage of the 90 % interval up to the first contact; null where there is no such step.
+    pub coverage90_before_contact: Option<f64>,
+    /// The same after it.
+    pub coverage90_after_contact: Option<f64>,
+    /// The same at the last step of each episode.
+    pub coverage90_last: Option<f64>,
+    /// The same at the last step of the episodes in which the obstacle was touched.
+    pub coverage90_last_touched: Option<f64>,
     /// Histogram of P(target ≤ truth), flat if calibrated.
     pub ranks: Vec<usize>,
 }
@@ -111,8 +119,14 @@ pub struct Calibration {
     pub obstacle_after_contact_accuracy: Option<f64>,
     /// Episodes of that share.
     pub obstacle_contact_episodes: usize,
-    /// Share of the episodes without an obstacle that end with more than half on `none`.
+    /// Share of the episodes without an obstacle that end with more than half on `none`. Always saying "something" scores 1 above and 0 here.
     pub no_obstacle_accuracy: Option<f64>,
+    /// Mean of the two: one half without any knowledge.
+    pub obstacle_balanced_accuracy: Option<f64>,
+    /// Share of the episodes with an obstacle that nothing touched that end with more than half on "something".
+    pub untouched_obstacle_found: Option<f64>,
+    /// Share of the episodes that touched it with more than half on "something" by steps since the first touch, as long as half of them last.
+    pub obstacle_found_since_touch: Vec<f64>,
     /// One per class target.
     pub classes: Vec<ClassReport>,
     /// One per step of the longest episode.

@@ -52,7 +52,11 @@ fn shifted_report(count: usize, spread: f32, shift: f32) -> Calibration {
     let held: Vec<Episode> = sequences
         .iter()
         .enumerate()
-        .map(|(i, sequence)| Episode { sequence, contact: contact(i), obstacle_touched: i.is_multiple_of(3) })
+        .map(|(i, sequence)| Episode {
+            sequence,
+            contact: contact(i),
+            obstacle_contact: i.is_multiple_of(3).then_some(1),
+        })
         .collect();
     let models = Models { network: &inference, baseline: &baseline, memoryless: Some(&inference) };
     calibrate(models, &layout, 1..2, &held)
@@ -65,6 +69,10 @@ fn coverage_of_a_true_model_is_nominal_and_of_an_overconfident_one_is_not() {
     for parameter in &honest.parameters {
         assert!((parameter.coverage90 - 0.9).abs() < 0.035, "{parameter:?}");
         assert!((parameter.coverage50 - 0.5).abs() < 0.056, "{parameter:?}");
+    }
+    let parts = &honest.parameters[0];
+    for part in [parts.coverage90_before_contact, parts.coverage90_after_contact, parts.coverage90_last] {
+        assert!(part.is_some_and(|share| (share - 0.9).abs() < 0.05), "{parts:?}");
     }
     assert_eq!(honest.parameters[0].count, 4000);
     assert!((1800..2200).contains(&honest.parameters[1].count), "counts only where it applies");
@@ -88,7 +96,7 @@ fn likelihood_equals_the_entropy_of_the_truth() {
     let [first, second] = honest.sharpening.as_slice() else { panic!("{} steps", honest.sharpening.len()) };
     assert_eq!((first.before_contact.count, first.since_contact.count, second.since_contact.count), (4000, 2000, 0));
     // y₁, known as well as before any observation: half of ½ ln(2πe), and ln 2 for the class.
-    assert!((first.all.static_nll.network - 0.5 * entropy - 2.0_f64.ln()).abs() < 0.05, "{first:?}");
+    assert!((first.all.static_nll.network.unwrap() - 0.5 * entropy - 2.0_f64.ln()).abs() < 0.05, "{first:?}");
     assert!((first.all.spread[0] - 1.0).abs() < 0.05, "{first:?}");
     assert!((first.all.class_probability[0] - 0.5).abs() < 1e-3, "{first:?}");
     assert_eq!((honest.sharpening[0].after_contact.count, honest.sharpening[1].after_contact.count), (0, 2000));
@@ -113,6 +121,8 @@ fn an_obstacle_counts_as_found_where_it_is_likelier_than_not() {
     for (shift, found, denied) in [(1.0, 1.0, 0.0), (-1.0, 0.0, 1.0)] {
         let report = shifted_report(60, 1.0, shift);
         assert_eq!((report.obstacle_after_contact_accuracy, report.no_obstacle_accuracy), (Some(found), Some(denied)));
+        assert_eq!(report.obstacle_balanced_accuracy, Some(0.5), "a constant answer knows nothing");
+        assert_eq!((report.untouched_obstacle_found, report.obstacle_found_since_touch), (Some(found), vec![found]));
     }
 }
 

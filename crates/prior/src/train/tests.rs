@@ -1,4 +1,5 @@
 use super::*;
+use crate::Inference;
 use crate::layout::tests::layout;
 use pomdp::Rng;
 use rand::RngExt as _;
@@ -92,6 +93,46 @@ fn a_known_mixture_is_recovered() {
     let last = trainer.curve().last().unwrap();
     assert!((last.training_nll - last.held_out_nll).abs() < 0.15, "both in original units: {last:?}");
     assert!((trainer.held_out_nll() - entropy).abs() < 0.12, "{} {entropy}", trainer.held_out_nll());
+}
+
+#[test]
+fn a_wrong_spread_is_found_again_on_the_held_out_part() {
+    // Without a hint in the observation, y ~ N(1, 0.5²) and z ~ N(0, 2²).
+    let mut rng = Seed(13).stream(Purpose::Test, 0);
+    let data: Vec<Sequence> = (0..2000)
+        .map(|_| {
+            let targets = vec![1.0 + 0.5 * normal(&mut rng), 2.0 * normal(&mut rng)];
+            Sequence { observations: vec![0.0], targets, mask: vec![1.0; 2], classes: vec![], steps: 1 }
+        })
+        .collect();
+    let mut trainer = Trainer::new(config(&[4], 1), layout(1, 2, &[]), &data, Seed(13)).unwrap();
+    for _ in 0..30 {
+        trainer.epoch().unwrap();
+    }
+    // The spread of y three times too small, that of z twice too large.
+    let head = trainer.dimensions().heads().iter().position(|(name, _)| *name == "log_stddevs").unwrap();
+    let mut wrong = trainer.parameters().clone();
+    wrong.tensors[3 + 2 * head + 1][0] -= 3.0_f32.ln();
+    wrong.tensors[3 + 2 * head + 1][1] += 2.0_f32.ln();
+    let right = trainer.rescaled(&wrong);
+    let spread = |parameters: &Parameters<f32>| {
+        let mut inference = Inference::new(&trainer.dimensions, &trainer.normalisation, parameters);
+        inference.step(&[0.0]).stddevs(0).to_vec()
+    };
+    let (wrong_spread, right_spread) = (spread(&wrong), spread(&right));
+    assert!(wrong_spread[0] < 0.2 && wrong_spread[1] > 3.5, "{wrong_spread:?}");
+    // Some 400 held-out episodes: the standard error of a spread is 3.5 %.
+    assert!((right_spread[0] - 0.5).abs() < 0.06 && (right_spread[1] - 2.0).abs() < 0.25, "{right_spread:?}");
+    assert!(trainer.nll_of(&right) < trainer.nll_of(&wrong) - 0.5);
+    assert!(trainer.nll_of(&right) <= trainer.held_out_nll() + 1e-4, "no other factor is better");
+}
+
+#[test]
+fn the_rate_falls_along_half_a_cosine() {
+    assert_eq!(Schedule::Constant.share(70, 100), 1.0);
+    let share = |epoch| Schedule::Cosine.share(epoch, 100);
+    assert!(share(1) > 0.999 && (share(50) - 0.5).abs() < 0.01 && share(100) < 1e-3 && share(100) > 0.0);
+    assert!((1..100).all(|epoch| share(epoch + 1) < share(epoch)));
 }
 
 #[test]
