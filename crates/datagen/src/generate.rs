@@ -190,8 +190,6 @@ mod tests {
                 (0..60).filter(|e| generator.episode(*e).unwrap().rows.iter().any(hit)).count()
             };
             let (goal, heuristic) = (reached("1.0"), reached("0.0"));
-            // Measured: 60 and 29 for the Sawyer, 55 and 55 for the Jaco, whose hand holds what it pushes. Behind an obstacle (D4) 47 and
-            // 26, and 39 and 45.
             // Measured: 57 and 25 for the Sawyer, 45 and 47 for the Jaco, whose hand holds what it pushes, so that going round it gains
             // nothing. Where there may be an obstacle (D4): 50 and 21, 29 and 39.
             assert!(goal >= 40, "{robot}: {goal} of 60");
