@@ -14,8 +14,11 @@ const ENDED: u8 = 1;
 /// Outcome of the last row of an episode whose world diverged in the action after it.
 const DIVERGED: u8 = 2;
 
+/// Whether something happened.
+type Event = fn(&ActionReport) -> bool;
+
 /// What a row says of the action before it.
-pub(crate) const EVENTS: [(&str, fn(&ActionReport) -> bool); 2] =
+pub(crate) const EVENTS: [(&str, Event); 2] =
     [("tool_touched", |report| report.tool_touched), ("obstacle_touched", |report| report.obstacle_touched)];
 
 /// A generated episode.

@@ -36,10 +36,11 @@ impl Baseline {
             for step in 0..sequence.steps {
                 let structure = index(&labels, &sequence.classes[step * kinds..(step + 1) * kinds]);
                 counts[structure] += 1.0;
-                for column in 0..width {
-                    if sequence.mask[step * width + column] == 1.0 {
-                        let value = f64::from(sequence.targets[step * width + column]);
-                        let (count, mean, squares) = &mut moments[structure][column];
+                let rows = step * width..(step + 1) * width;
+                let values = sequence.mask[rows.clone()].iter().zip(&sequence.targets[rows]);
+                for ((count, mean, squares), (mask, value)) in moments[structure].iter_mut().zip(values) {
+                    if *mask == 1.0 {
+                        let value = f64::from(*value);
                         *count += 1.0;
                         let delta = value - *mean;
                         *mean += delta / *count;

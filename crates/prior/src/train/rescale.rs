@@ -31,8 +31,8 @@ impl Trainer {
                 })
                 .collect();
             for target in 0..sizes.continuous {
-                let sum = |of: fn(&(Vec<f64>, Vec<f64>)) -> &Vec<f64>| parts.iter().map(|p| of(p)[target]).sum::<f64>();
-                let (squares, count) = (sum(|part| &part.0), sum(|part| &part.1));
+                let squares: f64 = parts.iter().map(|(squares, _)| squares[target]).sum();
+                let count: f64 = parts.iter().map(|(_, counts)| counts[target]).sum();
                 if squares > 0.0 && count >= 1.0 {
                     let log_factor = 0.5 * (squares / count).ln();
                     for component in 0..sizes.components {
