@@ -1,55 +1,18 @@
 //! Files that appear whole or not at all, and JSON that is read version first.
 
-use std::io::Write;
 use std::path::Path;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+pub(crate) use whole_file::Existing;
 
 use crate::{Error, VERSION};
 
-/// What to do with a file that is already there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Existing {
-    /// Leave it.
-    Keep,
-    /// Replace it in one step.
-    Replace,
-}
-
-/// Writes `bytes` to a hidden temporary file beside `path`, syncs it and gives it its name. Returns whether it did:
-/// with [`Existing::Keep`] a file that somebody else published meanwhile stays.
+/// Writes a file whole or not at all, with the folders above it. Returns whether it did: see [`whole_file::write`].
 pub(crate) fn publish(path: &Path, bytes: &[u8], existing: Existing) -> Result<bool, Error> {
-    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else {
-        unreachable!("{} is a file in a folder", path.display());
-    };
+    let Some(folder) = path.parent() else { unreachable!("{} is a file in a folder", path.display()) };
     std::fs::create_dir_all(folder).map_err(Error::io("create the folder", folder))?;
-    let prefix = format!(".{}.", name.to_string_lossy());
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(&prefix).suffix(".partial");
-    #[cfg(unix)]
-    {
-        // As any other new file, less the umask; the default lets only the owner read.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder.tempfile_in(folder).map_err(Error::io("create a temporary file in", folder))?;
-    file.write_all(bytes).map_err(Error::io("write", file.path()))?;
-    file.as_file().sync_all().map_err(Error::io("sync", file.path()))?;
-    let result = match existing {
-        Existing::Keep => file.persist_noclobber(path),
-        Existing::Replace => file.persist(path),
-    };
-    match result {
-        Ok(_) => {}
-        Err(e) if existing == Existing::Keep && e.error.kind() == std::io::ErrorKind::AlreadyExists => {
-            return Ok(false);
-        }
-        Err(e) => return Err(Error::io("publish", path)(e.error)),
-    }
-    #[cfg(unix)]
-    std::fs::File::open(folder).and_then(|f| f.sync_all()).map_err(Error::io("sync the folder", folder))?;
-    Ok(true)
+    whole_file::write(path, bytes, existing).map_err(|e| Error::io(e.action, &e.path)(e.source))
 }
 
 /// Reads a file; `None` where there is none.

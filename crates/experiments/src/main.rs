@@ -1,7 +1,7 @@
 //! `cargo xtask eval`: trials of methods on a domain, to a table.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,7 +15,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
 use prior::Suggester;
 use rayon::prelude::*;
-use scenario::{Filter, Problem, Scenario, Selection};
+use scenario::{Filter, Problem, Selection};
 
 /// Plays trials of methods on a domain and prints the table.
 #[derive(Debug, Parser)]
@@ -132,7 +132,8 @@ fn run(arguments: &Arguments) -> Result<bool> {
     methods.dedup();
     let problem = Problem::assemble(&scenario, &root)?;
     let prior = if methods.iter().any(|m| m.needs_prior()) {
-        let folder = prior_folder(arguments, &scenario, &root);
+        let default = || prior::default_folder(&root, &scenario.robot.name, arguments.quick);
+        let folder = arguments.prior.clone().unwrap_or_else(default);
         let prior = Suggester::load(&folder, &scenario.robot.name, &problem.model)?;
         eprintln!("prior: {}", folder.display());
         Some(prior)
@@ -258,14 +259,4 @@ fn seconds(text: &str) -> Result<Duration, String> {
     let good = |secs: &f64| (0.001..=86_400.0).contains(secs);
     let secs = text.parse::<f64>().ok().filter(good);
     secs.map(Duration::from_secs_f64).ok_or_else(|| format!("expected 0.001 to 86400 seconds, found `{text}`"))
-}
-
-fn prior_folder(arguments: &Arguments, scenario: &Scenario, root: &Path) -> PathBuf {
-    if let Some(folder) = &arguments.prior {
-        return folder.clone();
-    }
-    let trained = |folder: &str| root.join(folder).join(&scenario.robot.name);
-    let quick = arguments.quick.then(|| trained("runs/quick/priors"));
-    let candidates = quick.into_iter().chain([trained("runs/priors")]);
-    candidates.into_iter().find(|f| f.join("prior.json").is_file()).unwrap_or_else(|| trained("assets/priors"))
 }

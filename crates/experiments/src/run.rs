@@ -206,16 +206,8 @@ fn read_trials(file: &Path) -> Result<BTreeMap<(Method, u32), TrialRecord>, Erro
 
 /// Writes a file whole or not at all.
 fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let error = |source| Error::File { file: path.to_path_buf(), action: "writing", source };
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; results are as readable as the user's other files.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(error)?;
-    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(error)?;
-    file.persist(path).map_err(|e| error(e.error))?;
-    Ok(())
+    let error = |e: whole_file::Error| Error::File { file: path.to_path_buf(), action: "writing", source: e.source };
+    whole_file::write(path, bytes, whole_file::Existing::Replace).map(|_| ()).map_err(error)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! What can go wrong.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Errors of this crate. Numbers that are not finite are gaps in a picture, never errors.
 #[derive(Debug, thiserror::Error)]
@@ -55,12 +55,4 @@ pub enum Error {
         /// Why it failed.
         source: std::io::Error,
     },
-}
-
-impl Error {
-    /// An [`Error::Io`] maker for `map_err`.
-    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
-        let path = path.to_owned();
-        move |source| Self::Io { action, path, source }
-    }
 }

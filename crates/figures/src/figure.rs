@@ -6,7 +6,6 @@ use crate::Error;
 use crate::layout::lay_out;
 use crate::paint;
 use crate::panel::Panel;
-use crate::publish::publish;
 
 /// Panels in rows, with a title and one legend above them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -66,8 +65,13 @@ impl Figure {
             path.push(extension);
             PathBuf::from(path)
         });
-        publish(&paths[0], svg.as_bytes())?;
-        publish(&paths[1], &png)?;
+        for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
+            whole_file::write(path, bytes, whole_file::Existing::Replace).map_err(|e| Error::Io {
+                action: e.action,
+                path: e.path,
+                source: e.source,
+            })?;
+        }
         Ok(paths)
     }
 }

@@ -52,7 +52,6 @@ mod names;
 mod paint;
 mod palette;
 mod panel;
-mod publish;
 mod scene;
 mod text;
 

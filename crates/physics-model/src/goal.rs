@@ -11,7 +11,6 @@ use crate::robot::ToolShape;
 const PUSHING_SHARE: f64 = 0.4;
 /// Pull back to that line while pushing, in moves along the line per radius off it.
 const STEERING: f64 = 2.0;
-
 /// Nearer to the line behind the object than this (cosine of the angle at the object) the tool goes straight there.
 const STRAIGHT_COSINE: f64 = 0.7;
 /// Simulations that the policy's own action counts for at a new node, and how much less the others are worth than it.
@@ -30,8 +29,8 @@ impl GoalPolicy {
     fn target(model: &PushModel, particle: &Particle) -> Vector2<f64> {
         let goal = Vector2::new(model.config().task.goal.x_m, model.config().task.goal.y_m);
         let (Some(theta), Some(body)) = (&particle.theta.obstacle, &particle.state.obstacle) else { return goal };
-        let object = Vector2::new(particle.state.object.position_m[0], particle.state.object.position_m[1]);
-        let obstacle = Vector2::new(body.position_m[0], body.position_m[1]);
+        let object = plane(particle.state.object.position_m);
+        let obstacle = plane(body.position_m);
         let shape = &particle.theta.object;
         let clearance_m =
             shape.shape.footprint_radius_m(shape.size_m) + theta.shape.footprint_radius_m(theta.size_m) + ROOM_M;
@@ -50,13 +49,13 @@ impl GoalPolicy {
 
     /// Direction in which the tool should go, base frame; not of unit length.
     fn direction(model: &PushModel, particle: &Particle) -> Option<Vector2<f64>> {
-        let object = Vector2::new(particle.state.object.position_m[0], particle.state.object.position_m[1]);
+        let object = plane(particle.state.object.position_m);
         let along = (Self::target(model, particle) - object).try_normalize(1e-9)?;
         let across = Vector2::new(-along.y, along.x);
         let theta = &particle.theta.object;
         let radius_m = theta.shape.footprint_radius_m(theta.size_m);
         let tool = model.tool_position_m(&particle.state.joints_rad);
-        let offset = Vector2::new(tool[0], tool[1]) - object;
+        let offset = plane(tool) - object;
         let (ahead_m, aside_m) = (offset.dot(&along), offset.dot(&across));
         // What is wider than the object holds it between its ends: it goes where the tool goes. A narrow tool turns it round the contact.
         let half_width_m = tool_extent_m(model, across).min(tool_extent_m(model, -across));
@@ -117,14 +116,14 @@ impl Policy<PushModel> for GoalPolicy {
     /// As if tool and object went straight, step by step: first the tool to the place behind the object, then both to the goal region.
     fn leaf_value(&self, model: &PushModel, particle: &Particle, actions_left: usize) -> f64 {
         let task = &model.config().task;
-        let object = Vector2::new(particle.state.object.position_m[0], particle.state.object.position_m[1]);
+        let object = plane(particle.state.object.position_m);
         let tool = model.tool_position_m(&particle.state.joints_rad);
         let target = Self::target(model, particle);
         let goal = Vector2::new(task.goal.x_m, task.goal.y_m);
         let along = (target - object).try_normalize(1e-9).unwrap_or_default();
         let theta = &particle.theta.object;
         let behind = theta.shape.footprint_radius_m(theta.size_m) + tool_extent_m(model, along);
-        let to_place_m = (object - along * behind - Vector2::new(tool[0], tool[1])).norm();
+        let to_place_m = (object - along * behind - plane(tool)).norm();
         let by_way_m = if target == goal { 0.0 } else { (goal - target).norm() };
         let to_goal_m = ((target - object).norm() + by_way_m - task.goal.radius_m).max(0.0);
         let steps = ((to_place_m + to_goal_m) / task.step_m).ceil().max(1.0) as usize;
@@ -134,6 +133,10 @@ impl Policy<PushModel> for GoalPolicy {
         }
         cost(steps) + task.reward.goal * task.discount.powi(steps as i32 - 1)
     }
+}
+
+fn plane(position_m: [f64; 3]) -> Vector2<f64> {
+    Vector2::new(position_m[0], position_m[1])
 }
 
 /// How far the tool reaches from its centre in the horizontal unit `direction`, m.

@@ -15,8 +15,7 @@ const PLANE: [usize; 3] = [0, 1, 5];
 /// being moved to the nearest possible value, which would change the density. Of the state only the obstacle's pose in the plane is kept.
 #[must_use]
 pub fn raw_particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: usize, table_height_m: f64) -> Particle {
-    let written = draw.values.iter().zip(&layout.transforms);
-    let plain: Vec<f64> = written.map(|(value, transform)| transform.invert(*value, observation)).collect();
+    let plain = layout.invert(&draw.values, observation);
     let (state, targets) = plain.split_at(joints + 2 * BODY_LEN);
     let mut theta = features::theta_of_targets(targets, &draw.classes);
     if !(0.0..=1.0).contains(&theta.object.friction) {

@@ -6,9 +6,9 @@
 //!
 //! The published network is told no more of its targets than that. Here a target that a sensor measures is learnt as its difference from
 //! the measurement, a mass as its logarithm, sizes as extents (width, depth, height), which mean nearly the same for every shape, so that
-//! ten components need not be spent on telling a radius from a side, and a value of the state only down to a resolution: a body at rest has velocity 0 to the
-//! last bit, and a density that may grow there without bound would be all that a likelihood rewards. Noise of the size of the resolution
-//! is added to the targets, so that a calibrated network states at least that spread.
+//! ten components need not be spent on telling a radius from a side, and a value of the state only down to a resolution: a body at rest
+//! has velocity 0 to the last bit, and a density that may grow there without bound would be all that a likelihood rewards. Noise of the
+//! size of the resolution is added to the targets, so that a calibrated network states at least that spread.
 
 use dataset::{Episode, Schema};
 use physics_model::action::ACTION_COUNT;
@@ -261,12 +261,11 @@ pub fn first_event(schema: &Schema, episode: &Episode, event: &str) -> Option<us
 }
 
 /// A draw made after `observation` as a hypothesis on the table at `table_height_m`, inside the physical ranges: friction in [0, 1],
-/// positive masses and sizes, centre of mass inside the shape. A body drawn nearly upright and nearly resting is put upright and at rest height, because the mixture's
-/// components are diagonal and cannot hold height and size together.
+/// positive masses and sizes, centre of mass inside the shape. A body drawn nearly upright and nearly resting is put upright and at rest
+/// height, because the mixture's components are diagonal and cannot hold height and size together.
 #[must_use]
 pub fn particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: usize, table_height_m: f64) -> Particle {
-    let written = draw.values.iter().zip(&layout.transforms);
-    let plain: Vec<f64> = written.map(|(value, transform)| transform.invert(*value, observation)).collect();
+    let plain = layout.invert(&draw.values, observation);
     let (state, theta) = plain.split_at(joints + 2 * BODY_LEN);
     let mut values = [0.0; THETA_LEN];
     values.copy_from_slice(theta);

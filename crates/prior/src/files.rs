@@ -7,7 +7,6 @@ use crate::Error;
 use crate::parameters::{Parameters, TensorSpec};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
-use std::io::Write as _;
 use std::path::Path;
 
 /// A binary file beside the JSON file that names it.
@@ -96,14 +95,8 @@ fn write(dir: &Path, name: &str, bytes: &[u8]) -> Result<(), Error> {
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let dir = path.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(dir).map_err(Error::io(dir, "create"))?;
-    let mut builder = tempfile::Builder::new();
-    // Temporary files are private by default; a prior is as readable as the user's other files.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(dir).map_err(Error::io(path, "create"))?;
-    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(Error::io(path, "write"))?;
-    file.persist(path).map_err(|failed| Error::io(path, "rename to")(failed.error))?;
-    std::fs::File::open(dir).and_then(|dir| dir.sync_all()).map_err(Error::io(dir, "flush"))
+    let written = whole_file::write(path, bytes, whole_file::Existing::Replace);
+    written.map(|_| ()).map_err(|e| Error::io(&e.path, e.action)(e.source))
 }
 
 /// Weights in the safetensors format: little-endian header length, JSON header, little-endian f32.

@@ -65,6 +65,13 @@ pub struct ClassTarget {
 }
 
 impl Layout {
+    /// Continuous targets as they are, from how they are written after `observation`.
+    #[must_use]
+    pub fn invert(&self, written: &[f64], observation: &[f64]) -> Vec<f64> {
+        let each = written.iter().zip(&self.transforms);
+        each.map(|(value, transform)| transform.invert(*value, observation)).collect()
+    }
+
     /// Refuses `self`, read from `path`, unless it equals `expected`.
     ///
     /// # Errors

@@ -102,6 +102,16 @@ pub use suggest::Suggester;
 
 pub use train::{EpochReport, GradientPath, Schedule, TrainConfig, Trainer, curve_csv, is_held_out};
 
+/// The prior that a program takes for `robot` unless told otherwise: the one trained here (with `quick` one of a quick training first), else
+/// the shipped one.
+#[must_use]
+pub fn default_folder(root: &std::path::Path, robot: &str, quick: bool) -> std::path::PathBuf {
+    let at = |folder: &str| root.join(folder).join(robot);
+    let quick = quick.then(|| at("runs/quick/priors"));
+    let candidates = quick.into_iter().chain([at("runs/priors")]);
+    candidates.into_iter().find(|folder| folder.join(checkpoint::FILE).is_file()).unwrap_or_else(|| at("assets/priors"))
+}
+
 /// The nearest folder at or above `start` with scenarios, else `start`: the programs of this crate need no scenario, only a place for
 /// their default folders.
 #[must_use]

@@ -195,13 +195,13 @@ fn open_trainer(
         return Ok(Trainer::new(config.clone(), layout.clone(), sequences, seed)?);
     }
     let trainer = Trainer::resume(state, layout, sequences)?;
-    let facts = trainer.checkpoint(BTreeMap::new()).facts;
-    if facts.config != *config || facts.seed != seed.0 {
+    let (found, found_seed) = trainer.identity();
+    if found != config || found_seed != seed {
         return Err(anyhow!(
             "{}: holds a training with seed {} and {:?}, this one has seed {} and {config:?}: choose another --out or remove the folder",
             state.display(),
-            facts.seed,
-            facts.config,
+            found_seed.0,
+            found,
             seed.0,
         ));
     }

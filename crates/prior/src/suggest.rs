@@ -43,12 +43,6 @@ impl Suggester {
         &self.hash
     }
 
-    /// The mixture after the latest observation; `None` before the first.
-    #[must_use]
-    pub fn mixture(&self) -> Option<&Mixture> {
-        self.latest.as_ref().map(|(mixture, _)| mixture)
-    }
-
     /// A draw from the mixture; `None` before the first observation.
     pub fn sample(&self, table_height_m: f64, rng: &mut Rng) -> Option<Particle> {
         let (mixture, observation) = self.latest.as_ref()?;

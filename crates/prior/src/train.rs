@@ -226,21 +226,15 @@ impl Trainer {
     }
 
     fn nll_of(&self, parameters: &Parameters<f32>) -> f64 {
-        let references: Vec<&Sequence> = self.held_out.iter().collect();
-        let sums: Vec<(f64, usize)> = references
-            .par_chunks(64)
-            .map(|sequences| {
-                let alone = step::alone(self.config.network.memory, sequences);
-                let sequences = alone.as_ref().map_or(sequences.to_vec(), |alone| alone.iter().collect());
-                let batch = Batch::pack(&sequences, &self.dimensions);
-                (Workspace::new(&self.dimensions).loss(parameters, &batch), batch.rows)
-            })
-            .collect();
+        let loss = |batch: Batch<f32>| (Workspace::new(&self.dimensions).loss(parameters, &batch), batch.rows);
+        // Not a parallel sum: its order would depend on the threads.
+        let sums: Vec<(f64, usize)> = self.held_out_batches().map(loss).collect();
         let (loss, rows) = sums.iter().fold((0.0, 0), |(loss, rows), part| (loss + part.0, rows + part.1));
         loss / rows as f64 + self.held_out_offset
     }
 
-    /// The best weights so far as a prior, their spreads [rescaled](TrainConfig::rescale) if asked for; `provenance` is what the program knows about the run.
+    /// The best weights so far as a prior, their spreads [rescaled](TrainConfig::rescale) if asked for; `provenance` is what the program knows
+    /// about the run.
     #[must_use]
     pub fn checkpoint(&self, provenance: BTreeMap<String, String>) -> Checkpoint {
         let transitions = |sequences: &[Sequence]| sequences.iter().map(|sequence| sequence.steps).sum();
@@ -284,6 +278,12 @@ impl Trainer {
     #[must_use]
     pub fn finished(&self) -> bool {
         self.curve.last().map_or(self.config.max_epochs == 0, |last| last.finished)
+    }
+
+    /// Settings and root seed of the run.
+    #[must_use]
+    pub fn identity(&self) -> (&TrainConfig, Seed) {
+        (&self.config, self.seed)
     }
 
     /// Sizes of the network.

@@ -56,9 +56,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         None => prior::project_root(&std::env::current_dir()?),
     };
     let robot = &arguments.robot;
-    let trained = root.join("runs/priors").join(robot);
-    let default = if trained.join("prior.json").is_file() { trained } else { root.join("assets/priors").join(robot) };
-    let folder = arguments.prior.clone().unwrap_or(default);
+    let folder = arguments.prior.clone().unwrap_or_else(|| prior::default_folder(&root, robot, false));
     let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(robot));
     let out = arguments.out.clone().unwrap_or_else(|| folder.clone());
     rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;

@@ -3,8 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::{Trainer, step};
-use crate::Sequence;
+use super::Trainer;
 use crate::fused::{Batch, Workspace};
 use crate::parameters::Parameters;
 
@@ -20,16 +19,9 @@ impl Trainer {
         let head =
             sizes.heads().iter().position(|(name, _)| *name == "log_stddevs").expect("every network has this head");
         let bias = 3 * sizes.hidden.len() + 2 * head + 1;
-        let references: Vec<&Sequence> = self.held_out.iter().collect();
         for _ in 0..ROUNDS {
-            let parts: Vec<(Vec<f64>, Vec<f64>)> = references
-                .par_chunks(64)
-                .map(|sequences| {
-                    let alone = step::alone(self.config.network.memory, sequences);
-                    let sequences = alone.as_ref().map_or(sequences.to_vec(), |alone| alone.iter().collect());
-                    Workspace::new(sizes).moments(&rescaled, &Batch::pack(&sequences, sizes))
-                })
-                .collect();
+            let moments = |batch: Batch<f32>| Workspace::new(sizes).moments(&rescaled, &batch);
+            let parts: Vec<(Vec<f64>, Vec<f64>)> = self.held_out_batches().map(moments).collect();
             for target in 0..sizes.continuous {
                 let squares: f64 = parts.iter().map(|(squares, _)| squares[target]).sum();
                 let count: f64 = parts.iter().map(|(_, counts)| counts[target]).sum();

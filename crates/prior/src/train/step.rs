@@ -8,6 +8,7 @@ use crate::{Error, Sequence};
 use pomdp::{Purpose, Rng};
 use rand::Rng as _;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// What a step reports.
 pub(super) struct Done {
@@ -42,6 +43,24 @@ impl Trainer {
         Ok(Done { loss, transitions, norm })
     }
 
+    /// What the network takes for episodes: `sequences`, or without memory every step of them as a sequence of its own.
+    pub(super) fn remembered<'s>(&self, sequences: impl Iterator<Item = &'s Sequence>) -> Vec<Cow<'s, Sequence>> {
+        if self.config.network.memory {
+            sequences.map(Cow::Borrowed).collect()
+        } else {
+            sequences.flat_map(Sequence::single_steps).map(Cow::Owned).collect()
+        }
+    }
+
+    /// Packed batches of the held-out episodes.
+    pub(super) fn held_out_batches(&self) -> impl ParallelIterator<Item = Batch<f32>> + '_ {
+        self.held_out.par_chunks(64).map(|episodes| {
+            let sequences = self.remembered(episodes.iter());
+            let sequences: Vec<&Sequence> = sequences.iter().map(AsRef::as_ref).collect();
+            Batch::pack(&sequences, &self.dimensions)
+        })
+    }
+
     fn learning_rate(&self) -> f64 {
         self.config.learning_rate * self.config.schedule.share(self.curve.len() + 1, self.config.max_epochs)
     }
@@ -49,9 +68,8 @@ impl Trainer {
     /// Deals the batch into a fixed number of chunks, so that the sums do not depend on the number of threads.
     fn fused_gradient(&mut self, indices: &[usize], transitions: usize) -> (f64, Parameters<f32>) {
         let (sizes, parameters, chunks) = (&self.dimensions, &self.parameters, self.config.chunks);
-        let chosen: Vec<&Sequence> = indices.iter().map(|&index| &self.training[index]).collect();
-        let alone = alone(self.config.network.memory, &chosen);
-        let mut sequences = alone.as_ref().map_or(chosen, |alone| alone.iter().collect());
+        let sequences = self.remembered(indices.iter().map(|&index| &self.training[index]));
+        let mut sequences: Vec<&Sequence> = sequences.iter().map(AsRef::as_ref).collect();
         sequences.sort_by_key(|sequence| std::cmp::Reverse(sequence.steps));
         let (seed, steps, dropout) = (self.seed, self.steps, self.config.dropout);
         let scale = 1.0 / transitions as f32;
@@ -71,9 +89,8 @@ impl Trainer {
     }
 
     fn autodiff_gradient(&self, indices: &[usize]) -> (f64, Parameters<f32>) {
-        let chosen: Vec<&Sequence> = indices.iter().map(|&index| &self.training[index]).collect();
-        let alone = alone(self.config.network.memory, &chosen);
-        let sequences = alone.as_ref().map_or(chosen, |alone| alone.iter().collect());
+        let sequences = self.remembered(indices.iter().map(|&index| &self.training[index]));
+        let sequences: Vec<&Sequence> = sequences.iter().map(AsRef::as_ref).collect();
         let batch = Padded::new(&sequences, &self.dimensions, &device().autodiff());
         let mut rng = self.seed.stream(Purpose::Regularisation, self.steps);
         let factors = dropout_factors(self.config.dropout, &self.dimensions, batch.steps(), &mut rng);
@@ -81,11 +98,6 @@ impl Trainer {
         let gradient = self.network.gradients(&loss.backward());
         (f64::from(loss.into_scalar::<f32>()) * batch.steps() as f64, gradient)
     }
-}
-
-/// Without memory the steps of `sequences`, each a sequence of its own.
-pub(super) fn alone(memory: bool, sequences: &[&Sequence]) -> Option<Vec<Sequence>> {
-    (!memory).then(|| sequences.iter().flat_map(|sequence| sequence.single_steps()).collect())
 }
 
 /// Σ of the gradients in the order of the chunks.
