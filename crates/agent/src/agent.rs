@@ -7,7 +7,7 @@ use pomdp::{Discretise as _, Outcome, Policy, Prior as _, Proposals, Purpose, Rn
 use prior::Suggester;
 use scenario::{Filter, Problem, Rollouts, Tracker, with_known_joints};
 
-use crate::{Episode, Error, Method, Reason, StepRecord, World};
+use crate::{BeliefErrors, Episode, Error, Method, Reason, StepRecord, World};
 
 /// Attempts at drawing one possible suggestion.
 const DRAWS_PER_PROPOSAL: usize = 10;
@@ -28,6 +28,15 @@ enum Mind<'a> {
     Oracle(Box<Pomcp<PushModel>>),
     /// Search from the belief.
     Belief(Box<Pomcp<PushModel>>, Particles<Particle>, Tracker<'a>),
+}
+
+impl Mind<'_> {
+    /// Keeps how far the belief is from the world's truth, where there are both.
+    fn note_errors(&self, world: &dyn World, errors: &mut BeliefErrors) {
+        if let (Self::Belief(_, particles, _), Some(truth)) = (self, world.truth()) {
+            errors.push(particles, truth);
+        }
+    }
 }
 
 struct Streams {
@@ -82,6 +91,8 @@ impl<'a> Agent<'a> {
             prior.suggest(None, &observation);
         }
         let mut mind = self.first_mind(&observation, seed)?;
+        let mut belief_errors = BeliefErrors::default();
+        mind.note_errors(world, &mut belief_errors);
         let mut object_moved = false;
         let mut steps: Vec<StepRecord> = Vec::new();
         let mut depletions = 0;
@@ -98,10 +109,7 @@ impl<'a> Agent<'a> {
             };
             // Only moving the object (or reaching the goal, which ends the episode) pays more than a plain step.
             object_moved |= answer.reward > self.problem.scenario.task.reward.step;
-            record.observation = answer.observation.clone();
-            record.reward = answer.reward;
-            record.large_force = answer.report.events.large_force;
-            record.obstacle_touched = answer.report.obstacle_touched;
+            record.note_answer(&answer);
             observation = answer.observation;
             joints_rad = answer.joints_rad;
             match answer.outcome {
@@ -113,50 +121,16 @@ impl<'a> Agent<'a> {
                 steps.push(record);
                 break;
             }
-            let proposals = match &mut self.prior {
-                Some(prior) => {
-                    prior.suggest(Some(&record.action), &observation);
-                    let context = Context { model, observation: &observation, joints_rad: &joints_rad, object_moved };
-                    let count = self.problem.scenario.agent.proposals;
-                    suggest(prior, self.method, &context, count, &mut streams.suggestion)
-                }
-                None => Vec::new(),
+            let context = Context { model, observation: &observation, joints_rad: &joints_rad, object_moved };
+            let Some(next) = self.learn(mind, &mut record, &context, &mut streams)? else {
+                depletions += 1;
+                steps.push(record);
+                reason = Reason::Depleted;
+                break;
             };
-            mind = match mind {
-                Mind::Belief(mut search, particles, mut filter) => {
-                    let mobility = model.config().world.obstacle_mobility;
-                    let prior = self.prior.as_ref();
-                    let density =
-                        |p: &Particle| prior.map_or(f64::NEG_INFINITY, |prior| prior.log_density(mobility, p));
-                    let proposals = match self.method {
-                        Method::Mixture => Proposals::weighted(&proposals, &density),
-                        _ => Proposals::unweighted(&proposals),
-                    };
-                    match filter.update(model, particles, record.action, &observation, proposals, &mut streams.filter) {
-                        Ok((particles, report)) => {
-                            depletions += usize::from(report.acceptance == 0.0 || report.recoveries > 0);
-                            record.transitions += report.transitions;
-                            record.update = Some(report);
-                            record.obstacle_share = Some(obstacle_share(&particles));
-                            search.prune(&record.action, &model.key(&observation));
-                            Mind::Belief(search, with_known_joints(particles, &joints_rad)?, filter)
-                        }
-                        Err(belief::Error::Depleted { attempts, .. }) => {
-                            depletions += 1;
-                            record.transitions += attempts;
-                            steps.push(record);
-                            reason = Reason::Depleted;
-                            break;
-                        }
-                        Err(error) => return Err(error.into()),
-                    }
-                }
-                Mind::Oracle(mut search) => {
-                    search.prune(&record.action, &model.key(&observation));
-                    Mind::Oracle(search)
-                }
-                Mind::Heuristic => Mind::Heuristic,
-            };
+            mind = next;
+            mind.note_errors(world, &mut belief_errors);
+            depletions += usize::from(record.update.as_ref().is_some_and(|u| u.acceptance == 0.0 || u.recoveries > 0));
             tracing::debug!(
                 time,
                 action = record.action.index(),
@@ -170,7 +144,57 @@ impl<'a> Agent<'a> {
         }
         let rewards = steps.iter().map(|s| s.reward);
         let discounted_return = discounted_return(rewards, self.problem.scenario.task.discount);
-        Ok(Episode { reason, discounted_return, depletions, steps, failure })
+        let belief_errors = (!belief_errors.is_empty()).then_some(belief_errors);
+        Ok(Episode { reason, discounted_return, depletions, steps, belief_errors, failure })
+    }
+
+    /// What the agent carries on after an action and its observation; `None` where no particle is left.
+    fn learn<'m>(
+        &mut self,
+        mind: Mind<'m>,
+        record: &mut StepRecord,
+        context: &Context<'_>,
+        streams: &mut Streams,
+    ) -> Result<Option<Mind<'m>>, Error> {
+        let Context { model, observation, .. } = *context;
+        let proposals = match &mut self.prior {
+            Some(prior) => {
+                prior.suggest(Some(&record.action), observation);
+                let count = self.problem.scenario.agent.proposals;
+                suggest(prior, self.method, context, count, &mut streams.suggestion)
+            }
+            None => Vec::new(),
+        };
+        Ok(Some(match mind {
+            Mind::Belief(mut search, particles, mut filter) => {
+                let mobility = model.config().world.obstacle_mobility;
+                let prior = self.prior.as_ref();
+                let density = |p: &Particle| prior.map_or(f64::NEG_INFINITY, |prior| prior.log_density(mobility, p));
+                let proposals = match self.method {
+                    Method::Mixture => Proposals::weighted(&proposals, &density),
+                    _ => Proposals::unweighted(&proposals),
+                };
+                match filter.update(model, particles, record.action, observation, proposals, &mut streams.filter) {
+                    Ok((particles, report)) => {
+                        record.transitions += report.transitions;
+                        record.update = Some(report);
+                        record.obstacle_share = Some(obstacle_share(&particles));
+                        search.prune(&record.action, &model.key(observation));
+                        Mind::Belief(search, with_known_joints(particles, context.joints_rad)?, filter)
+                    }
+                    Err(belief::Error::Depleted { attempts, .. }) => {
+                        record.transitions += attempts;
+                        return Ok(None);
+                    }
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            Mind::Oracle(mut search) => {
+                search.prune(&record.action, &model.key(observation));
+                Mind::Oracle(search)
+            }
+            Mind::Heuristic => Mind::Heuristic,
+        }))
     }
 
     fn first_mind(&self, observation: &Observation, seed: Seed) -> Result<Mind<'a>, Error> {
@@ -232,6 +256,7 @@ impl<'a> Agent<'a> {
             update: None,
             obstacle_share: None,
             large_force: false,
+            out_of_reach: false,
             obstacle_touched: false,
         })
     }

@@ -4,6 +4,7 @@
 //! ([`SimulatedWorld`]) or another program ([`ExternalWorld`]).
 
 mod agent;
+mod belief_errors;
 mod error;
 mod external;
 mod method;
@@ -11,6 +12,7 @@ mod record;
 mod world;
 
 pub use agent::Agent;
+pub use belief_errors::BeliefErrors;
 pub use error::Error;
 pub use external::{
     ExternalEpisode, ExternalWorld, LINE_LIMIT_BYTES, PROTOCOL, Timeouts, WorldAddress, WorldError, WorldIdentity,

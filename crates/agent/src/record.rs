@@ -4,6 +4,8 @@ use physics_model::{Action, Observation};
 use pomdp::UpdateReport;
 use serde::{Deserialize, Serialize};
 
+use crate::{BeliefErrors, WorldStep};
+
 /// Why an episode ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -57,8 +59,22 @@ pub struct StepRecord {
     pub obstacle_share: Option<f64>,
     /// A force above the limit.
     pub large_force: bool,
+    /// The move would have left the reachable region, and was not made.
+    pub out_of_reach: bool,
     /// The object or the tool pushed against the obstacle.
     pub obstacle_touched: bool,
+}
+
+impl StepRecord {
+    /// Adds what the world answered.
+    pub(crate) fn note_answer(&mut self, answer: &WorldStep) {
+        let events = answer.report.events;
+        self.observation = answer.observation.clone();
+        self.reward = answer.reward;
+        self.large_force = events.large_force;
+        self.out_of_reach = events.out_of_reach;
+        self.obstacle_touched = answer.report.obstacle_touched;
+    }
 }
 
 /// An episode.
@@ -72,6 +88,8 @@ pub struct Episode {
     pub depletions: usize,
     /// Steps.
     pub steps: Vec<StepRecord>,
+    /// Errors of the beliefs; `None` without a belief, or in a world that does not know its truth.
+    pub belief_errors: Option<BeliefErrors>,
     /// What the world did wrong, where that ended the episode.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
@@ -82,7 +100,7 @@ impl Episode {
     #[must_use]
     pub fn failed(failure: String) -> Self {
         let (reason, failure) = (Reason::WorldFailed, Some(failure));
-        Self { reason, discounted_return: 0.0, depletions: 0, steps: Vec::new(), failure }
+        Self { reason, discounted_return: 0.0, depletions: 0, steps: Vec::new(), belief_errors: None, failure }
     }
 
     /// Whether the object reached the goal region.

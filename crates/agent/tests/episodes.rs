@@ -118,6 +118,25 @@ fn an_observation_that_no_particle_explains_ends_the_episode_as_depleted() {
 }
 
 #[test]
+fn the_errors_of_the_first_belief_and_of_each_update_are_kept_where_there_is_a_belief_and_a_truth() {
+    let problem = problem("D4", &["planner.budget={transitions=60}", "task.horizon=5"]);
+    let play = |method| {
+        let mut agent = Agent::new(&problem, method, None).unwrap();
+        agent.run(&mut world(&problem, Seed(3)), Seed(3)).unwrap()
+    };
+    let episode = play(Method::NoRnn);
+    let updates = episode.steps.iter().filter(|step| step.update.is_some()).count();
+    let errors = episode.belief_errors.unwrap();
+    assert!(updates > 0 && errors.len() == updates + 1, "{updates} updates, {} errors", errors.len());
+    assert_eq!((errors.shape_probability.len(), errors.obstacle_m.len()), (errors.len(), errors.len()));
+    let shares = errors.shape_probability.iter().chain(&errors.obstacle_probability);
+    assert!(shares.chain(&errors.friction).all(|value| (0.0..=1.0).contains(value)), "{errors:?}");
+    for method in [Method::Oracle, Method::Heuristic] {
+        assert_eq!(play(method).belief_errors, None, "{method:?} has no belief");
+    }
+}
+
+#[test]
 fn the_first_belief_of_the_obstacle_task_knows_no_obstacle() {
     let unaware = problem("obstacle", &[]);
     let seed = Seed(1);

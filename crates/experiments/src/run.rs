@@ -234,23 +234,8 @@ mod tests {
     }
 
     fn record(method: Method, trial: u32, success: bool) -> TrialRecord {
-        TrialRecord {
-            method,
-            trial,
-            seed: 1,
-            success,
-            reason: if success { Reason::Goal } else { Reason::Horizon },
-            steps: 4,
-            discounted_return: 0.5,
-            depletions: 0,
-            transitions: 10,
-            large_forces: 0,
-            has_obstacle: false,
-            obstacle_touched: false,
-            actions: vec![2; 4],
-            failure: None,
-            seconds: 0.1,
-        }
+        let reason = if success { Reason::Goal } else { Reason::Horizon };
+        TrialRecord { method, trial, success, reason, ..crate::trial::tests::record() }
     }
 
     fn finish(run: &Run) -> Table {

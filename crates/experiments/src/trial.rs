@@ -1,6 +1,6 @@
 //! One trial: a drawn world, one method.
 
-use agent::{Agent, Episode, Method, Reason, SimulatedWorld};
+use agent::{Agent, BeliefErrors, Episode, Method, Reason, SimulatedWorld};
 use pomdp::{Purpose, Seed};
 use prior::Suggester;
 use scenario::Problem;
@@ -32,12 +32,16 @@ pub struct TrialRecord {
     pub transitions: usize,
     /// Actions with a force above the limit.
     pub large_forces: usize,
+    /// Actions that would have left the reachable region, and were not made.
+    pub out_of_reach: usize,
     /// The world has an obstacle; false where an external one does not say.
     pub has_obstacle: bool,
     /// The object or the tool pushed against it.
     pub obstacle_touched: bool,
     /// Actions taken, by index.
     pub actions: Vec<u8>,
+    /// Errors of the beliefs; null without a belief, or in a world that does not know its truth.
+    pub belief_errors: Option<BeliefErrors>,
     /// What the world did wrong, where that ended the trial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
@@ -112,10 +116,40 @@ fn record(method: Method, trial: u32, seed: Seed, has_obstacle: bool, episode: &
         depletions: episode.depletions,
         transitions: episode.transitions(),
         large_forces: episode.steps.iter().filter(|s| s.large_force).count(),
+        out_of_reach: episode.steps.iter().filter(|s| s.out_of_reach).count(),
         has_obstacle,
         obstacle_touched: episode.steps.iter().any(|s| s.obstacle_touched),
         actions: episode.steps.iter().map(|s| s.action.into()).collect(),
+        belief_errors: episode.belief_errors.clone(),
         failure: episode.failure.clone(),
         seconds: 0.0,
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A trial that reached the goal.
+    pub(crate) fn record() -> TrialRecord {
+        TrialRecord {
+            method: Method::NoRnn,
+            trial: 0,
+            seed: 1,
+            success: true,
+            reason: Reason::Goal,
+            steps: 4,
+            discounted_return: 0.5,
+            depletions: 0,
+            transitions: 10,
+            large_forces: 0,
+            out_of_reach: 0,
+            has_obstacle: false,
+            obstacle_touched: false,
+            actions: vec![2; 4],
+            belief_errors: None,
+            failure: None,
+            seconds: 0.1,
+        }
     }
 }
