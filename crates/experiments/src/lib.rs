@@ -4,6 +4,7 @@
 //! trials are done, `table.json`, `table.md` and `table.csv`. Finished trials are never redone.
 
 mod error;
+mod failure;
 mod interval;
 mod paired;
 mod run;
@@ -12,6 +13,7 @@ mod trial;
 mod worlds;
 
 pub use error::Error;
+pub use failure::Failure;
 pub use interval::wilson95;
 pub use paired::Pair;
 pub use run::{Provenance, Run, RunIdentity};

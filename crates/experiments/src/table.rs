@@ -8,7 +8,7 @@ use scenario::Published;
 use serde::{Deserialize, Serialize};
 
 use crate::paired::{Pair, pairs};
-use crate::{Provenance, TrialRecord, wilson95};
+use crate::{Failure, Provenance, TrialRecord, wilson95};
 
 /// A method's row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +31,8 @@ pub struct Row {
     pub published: Option<Published>,
     /// Trials by the reason they ended for.
     pub reasons: BTreeMap<Reason, u32>,
+    /// Failed trials by what kept them from the goal: see [`Failure::of`].
+    pub failures: BTreeMap<Failure, u32>,
     /// Mean discounted return.
     pub mean_return: f64,
     /// Mean number of actions of the successful trials; null where none was.
@@ -39,6 +41,10 @@ pub struct Row {
     pub mean_depletions: f64,
     /// Simulated transitions per action.
     pub transitions_per_action: f64,
+    /// Actions with a force above the limit, per trial.
+    pub mean_large_forces: f64,
+    /// Actions that would have left the reachable region, per trial.
+    pub mean_out_of_reach: f64,
     /// Trials whose world has an obstacle.
     pub with_obstacle: u32,
     /// Trials in which the object or the tool pushed against it.
@@ -72,9 +78,12 @@ impl Table {
             let count = |filter: &dyn Fn(&TrialRecord) -> bool| of_method.iter().filter(|t| filter(t)).count() as u32;
             let n = of_method.len() as u32;
             let successes = count(&|t| t.success);
-            let mut reasons = BTreeMap::new();
+            let (mut reasons, mut failures) = (BTreeMap::new(), BTreeMap::new());
             for trial in &of_method {
                 *reasons.entry(trial.reason).or_insert(0) += 1;
+                if let Some(failure) = Failure::of(trial) {
+                    *failures.entry(failure).or_insert(0) += 1;
+                }
             }
             let mean = |value: &dyn Fn(&TrialRecord) -> f64| {
                 of_method.iter().map(|t| value(t)).sum::<f64>() / f64::from(n.max(1))
@@ -92,10 +101,13 @@ impl Table {
                 interval95: wilson95(successes, n),
                 published: published.get(method.name()).copied(),
                 reasons,
+                failures,
                 mean_return: mean(&|t| t.discounted_return),
                 mean_steps_to_goal: (successes > 0).then(|| steps_to_goal as f64 / f64::from(successes)),
                 mean_depletions: mean(&|t| t.depletions as f64),
                 transitions_per_action: transitions as f64 / actions.max(1) as f64,
+                mean_large_forces: mean(&|t| t.large_forces as f64),
+                mean_out_of_reach: mean(&|t| t.out_of_reach as f64),
                 with_obstacle: count(&|t| t.has_obstacle),
                 obstacle_touched: count(&|t| t.obstacle_touched),
             }
