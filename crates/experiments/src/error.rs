@@ -8,6 +8,21 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// The scenario cannot be used.
+    #[error(transparent)]
+    Scenario(#[from] scenario::Error),
+    /// The prior cannot be used.
+    #[error(transparent)]
+    Prior(#[from] prior::Error),
+    /// A method does not go with the scenario, the prior or the world.
+    #[error(transparent)]
+    Agent(#[from] agent::Error),
+    /// The world cannot be used.
+    #[error(transparent)]
+    World(#[from] agent::WorldError),
+    /// No threads to play on.
+    #[error("the threads that play trials cannot be started")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// The folder belongs to another run.
     #[error("{file}: key `{key}` is {found}, this run has {expected}: choose another --out or remove the folder")]
     OtherRun {

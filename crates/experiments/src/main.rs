@@ -1,21 +1,16 @@
 //! `cargo xtask eval`: trials of methods on a domain, to a table.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use agent::{Agent, Method, Timeouts, WorldAddress};
+use agent::{Method, Timeouts, WorldAddress};
 use anyhow::{Context as _, Result};
 use clap::Parser;
-use experiments::{Provenance, Run, RunIdentity, Worlds, play, play_external};
-use indicatif::{ProgressBar, ProgressStyle};
-use pomdp::Seed;
-use prior::Suggester;
-use rayon::prelude::*;
-use scenario::{Filter, Problem, Selection};
+use experiments::{Evaluation, Player, Request};
+use scenario::Selection;
 
 /// Plays trials of methods on a domain and prints the table.
 #[derive(Debug, Parser)]
@@ -109,81 +104,23 @@ fn run(arguments: &Arguments) -> Result<bool> {
         Some(root) => root.clone(),
         None => scenario::find_root(&std::env::current_dir()?)?,
     };
-    let mut scenario = Selection {
-        root: root.clone(),
-        domain: arguments.domain.clone(),
-        robot: arguments.robot.clone(),
-        preset: arguments.preset.clone(),
-        quick: arguments.quick,
-        set: arguments.set.clone(),
-    }
-    .load()?;
-    if let Some(trials) = arguments.trials {
-        scenario.evaluation.trials = trials;
-    }
-    let mut methods = arguments.methods.clone();
-    if methods.is_empty() {
-        methods = match scenario.belief.filter {
-            Filter::Rejection => vec![Method::NoRnn, Method::RnnMax, Method::RnnSampling],
-            Filter::Weighted => vec![Method::NoRnn, Method::Mixture],
-        };
-    }
-    methods.sort();
-    methods.dedup();
-    let problem = Problem::assemble(&scenario, &root)?;
-    let prior = if methods.iter().any(|m| m.needs_prior()) {
-        let default = || prior::default_folder(&root, &scenario.robot.name, arguments.quick);
-        let folder = arguments.prior.clone().unwrap_or_else(default);
-        let prior = Suggester::load(&folder, &scenario.robot.name, &problem.model)?;
+    let evaluation = Evaluation::prepare(&request(arguments, &root))?;
+    if let Some(folder) = evaluation.prior_folder() {
         eprintln!("prior: {}", folder.display());
-        Some(prior)
-    } else {
-        None
-    };
-    // What a method cannot do is said before a folder is made.
-    for method in &methods {
-        Agent::new(&problem, *method, prior.as_ref())?;
     }
-    let worlds = match &arguments.world {
-        Some(_) if methods.contains(&Method::Oracle) => return Err(agent::Error::NoTruth.into()),
-        Some(address) => {
-            let (start, reset, act) =
-                (arguments.world_start_secs, arguments.world_reset_secs, arguments.world_act_secs);
-            Some(Worlds::start(address.clone(), Timeouts { start, reset, act }, &problem)?)
-        }
-        None => None,
-    };
-    let world = worlds.as_ref().map(|worlds| worlds.identity().clone());
-    let provenance = Provenance {
-        run: RunIdentity {
-            version: 1,
-            scenario_hash: scenario.hash(),
-            seed: arguments.seed,
-            prior_hash: prior.as_ref().map(|p| p.hash().to_string()),
-            urdf_hash: scenario.urdf_hash(&root)?,
-            commit: scenario::commit(&root),
-            world: world.clone(),
-        },
-        program: format!("eval {}", env!("CARGO_PKG_VERSION")),
-        methods,
-        trials: scenario.evaluation.trials,
-    };
     let out = arguments.out.clone().unwrap_or_else(|| {
-        let world = world.map_or_else(String::new, |world| format!("-{}", world.name));
-        let name = format!("{}-{}-{}{world}", scenario.name, scenario.robot.name, scenario.preset);
-        root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(name)
+        root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(evaluation.name())
     });
-    let run = Run::open(&out, provenance, &scenario.to_toml())?;
+    let run = evaluation.open(&out)?;
     if run.resumed() > 0 {
         eprintln!("{} trials are finished already", run.resumed());
     }
-    if !play_missing(&run, &problem, prior.as_ref(), worlds.as_ref(), arguments).context(Failed)? {
+    let interrupted = listen_for_interrupts()?;
+    let player = Player { threads: arguments.threads, interrupted: &interrupted };
+    if !player.play(&evaluation, &run).context(Failed)? {
         return Ok(false);
     }
-    let s = &scenario;
-    // The published figures are those of the paper's own simulation.
-    let published = if worlds.is_some() { &BTreeMap::new() } else { &s.evaluation.published };
-    let table = run.finish(&s.name, &s.robot.name, &s.preset, published).context(Failed)?;
+    let table = evaluation.finish(&run).context(Failed)?;
     if arguments.json {
         println!("{}", serde_json::to_string(&table)?);
     } else {
@@ -193,65 +130,31 @@ fn run(arguments: &Arguments) -> Result<bool> {
     Ok(true)
 }
 
-/// Plays what is missing on all threads; false where it was interrupted.
-fn play_missing(
-    run: &Run,
-    problem: &Problem,
-    prior: Option<&Suggester>,
-    worlds: Option<&Worlds<'_>>,
-    arguments: &Arguments,
-) -> Result<bool> {
+fn request(arguments: &Arguments, root: &Path) -> Request {
+    let (start, reset, act) = (arguments.world_start_secs, arguments.world_reset_secs, arguments.world_act_secs);
+    Request {
+        selection: Selection {
+            root: root.to_path_buf(),
+            domain: arguments.domain.clone(),
+            robot: arguments.robot.clone(),
+            preset: arguments.preset.clone(),
+            quick: arguments.quick,
+            set: arguments.set.clone(),
+        },
+        methods: arguments.methods.clone(),
+        trials: arguments.trials,
+        seed: arguments.seed,
+        prior: arguments.prior.clone(),
+        world: arguments.world.clone().map(|address| (address, Timeouts { start, reset, act })),
+    }
+}
+
+/// A flag that an interrupt sets.
+fn listen_for_interrupts() -> Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
-    let missing = run.missing();
-    let bar = ProgressBar::new(missing.len() as u64);
-    let style = "{bar:40} {pos}/{len} trials, {per_sec}, {eta} left {msg}";
-    bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
-    bar.enable_steady_tick(Duration::from_millis(200));
-    // One robot behind a socket plays one trial at a time.
-    let socket = matches!(arguments.world, Some(WorldAddress::Tcp(_)));
-    let threads = arguments.threads.unwrap_or(u32::from(socket));
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build()?;
-    let failed = AtomicBool::new(false);
-    let results: Vec<Result<()>> = pool.install(|| {
-        missing
-            .par_iter()
-            .with_max_len(1)
-            .map(|&(method, trial)| {
-                if interrupted.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed) {
-                    return Ok(());
-                }
-                #[expect(clippy::disallowed_methods, reason = "a program may time its trials; nothing depends on it")]
-                let started = std::time::Instant::now();
-                let seed = Seed(arguments.seed);
-                let played = match worlds {
-                    Some(worlds) => play_external(problem, method, prior, seed, trial, worlds),
-                    None => play(problem, method, prior, seed, trial),
-                };
-                let (mut record, _) = played.inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
-                record.seconds = started.elapsed().as_secs_f64();
-                run.keep(&record)?;
-                if let Some(failure) = &record.failure {
-                    bar.suspend(|| eprintln!("{} trial {trial}: {failure}", method.name()));
-                }
-                bar.inc(1);
-                if bar.is_hidden() {
-                    let end = record.reason.name();
-                    eprintln!(
-                        "{} trial {trial}: {end} after {} actions, {:.1} s",
-                        method.name(),
-                        record.steps,
-                        record.seconds
-                    );
-                }
-                Ok(())
-            })
-            .collect()
-    });
-    bar.finish_and_clear();
-    results.into_iter().collect::<Result<Vec<()>>>()?;
-    Ok(!interrupted.load(Ordering::Relaxed))
+    Ok(interrupted)
 }
 
 /// A time-out on the command line.

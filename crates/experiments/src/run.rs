@@ -8,8 +8,8 @@ use std::sync::Mutex;
 
 use agent::{Method, WorldIdentity};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 
+use crate::files::{claim, file_error, pretty, write_atomically};
 use crate::{Error, Table, TrialRecord};
 
 /// What decides the results of a run. A folder is resumed only by the same run.
@@ -61,23 +61,8 @@ impl Run {
     ///
     /// A folder of another run, an unreadable record, a folder that cannot be written. Nothing is overwritten.
     pub fn open(folder: &Path, provenance: Provenance, scenario_toml: &str) -> Result<Self, Error> {
-        let file_error = |file: &Path, action| {
-            let file = file.to_path_buf();
-            move |source| Error::File { file, action, source }
-        };
-        std::fs::create_dir_all(folder).map_err(file_error(folder, "creating the folder"))?;
-        let identity_file = folder.join("run.json");
-        match std::fs::read_to_string(&identity_file) {
-            Ok(text) => check_identity(&identity_file, &text, &provenance.run)?,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-                let ours = ["scenario.toml", "trials.jsonl", "table.json", "table.md", "table.csv"];
-                if let Some(file) = ours.iter().map(|name| folder.join(name)).find(|file| file.exists()) {
-                    return Err(Error::Foreign { file, expected: "run.json" });
-                }
-                write_atomically(&identity_file, pretty(&provenance.run).as_bytes())?;
-            }
-            Err(e) => return Err(file_error(&identity_file, "reading")(e)),
-        }
+        let ours = ["scenario.toml", "trials.jsonl", "table.json", "table.md", "table.csv"];
+        claim(folder, "run.json", &provenance.run, &ours)?;
         // After the identity, so that a kill in between leaves a folder that says whose it is.
         let scenario_file = folder.join("scenario.toml");
         if !scenario_file.exists() {
@@ -119,11 +104,8 @@ impl Run {
         let mut line = serde_json::to_string(record).expect("a record is plain data");
         line.push('\n');
         let mut log = self.log.lock().expect("no thread panics while it writes");
-        log.write_all(line.as_bytes()).and_then(|()| log.sync_data()).map_err(|source| Error::File {
-            file: self.folder.join("trials.jsonl"),
-            action: "writing",
-            source,
-        })
+        let written = log.write_all(line.as_bytes()).and_then(|()| log.sync_data());
+        written.map_err(file_error(&self.folder.join("trials.jsonl"), "writing"))
     }
 
     /// Writes the tables from all trials, in order.
@@ -158,39 +140,18 @@ impl Run {
     }
 }
 
-fn pretty<T: Serialize>(value: &T) -> String {
-    serde_json::to_string_pretty(value).expect("plain data has a JSON form") + "\n"
-}
-
-fn check_identity(file: &Path, text: &str, expected: &RunIdentity) -> Result<(), Error> {
-    let found: Value = serde_json::from_str(text).unwrap_or(Value::Null);
-    let expected = serde_json::to_value(expected).expect("plain data has a JSON form");
-    for (key, value) in expected.as_object().expect("a struct is an object") {
-        let other = found.get(key).unwrap_or(&Value::Null);
-        if other != value {
-            return Err(Error::OtherRun {
-                file: file.to_path_buf(),
-                key: key.clone(),
-                found: other.to_string(),
-                expected: value.to_string(),
-            });
-        }
-    }
-    Ok(())
-}
-
 /// Finished trials. A last line without its line feed is what a kill left of a write: it is dropped, and cut from the file so that the
 /// next record starts a line of its own.
 fn read_trials(file: &Path) -> Result<BTreeMap<(Method, u32), TrialRecord>, Error> {
     let text = match std::fs::read_to_string(file) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
-        Err(source) => return Err(Error::File { file: file.to_path_buf(), action: "reading", source }),
+        Err(e) => return Err(file_error(file, "reading")(e)),
     };
     let whole = text.rfind('\n').map_or(0, |at| at + 1);
     if whole < text.len() {
         let cut = OpenOptions::new().write(true).open(file).and_then(|f| f.set_len(whole as u64));
-        cut.map_err(|source| Error::File { file: file.to_path_buf(), action: "cutting a broken line", source })?;
+        cut.map_err(file_error(file, "cutting a broken line"))?;
     }
     let mut trials = BTreeMap::new();
     for (index, line) in text[..whole].lines().enumerate() {
@@ -202,12 +163,6 @@ fn read_trials(file: &Path) -> Result<BTreeMap<(Method, u32), TrialRecord>, Erro
         trials.entry((record.method, record.trial)).or_insert(record);
     }
     Ok(trials)
-}
-
-/// Writes a file whole or not at all.
-fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let error = |e: whole_file::Error| Error::File { file: path.to_path_buf(), action: "writing", source: e.source };
-    whole_file::write(path, bytes, whole_file::Existing::Replace).map(|_| ()).map_err(error)
 }
 
 #[cfg(test)]

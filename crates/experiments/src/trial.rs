@@ -6,9 +6,11 @@ use prior::Suggester;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
+use crate::clock::{DecisionTimes, Stopwatch, Timed};
 use crate::{Error, Worlds};
 
-/// What is kept of a trial: one line of `trials.jsonl`. All but `seconds` is a function of scenario, method, trial and seed.
+/// What is kept of a trial: one line of `trials.jsonl`. All before `seconds` is a function of scenario, method, trial and seed; `seconds` and
+/// what follows is the clock's.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrialRecord {
@@ -45,11 +47,15 @@ pub struct TrialRecord {
     /// What the world did wrong, where that ended the trial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Wall-clock time, s.
+    /// Wall-clock time of the trial, s.
     pub seconds: f64,
+    /// Wall-clock time of all decisions, s: from an answer of the world to the next action.
+    pub decision_seconds: f64,
+    /// Wall-clock time of the slowest decision, s.
+    pub slowest_decision_seconds: f64,
 }
 
-/// Plays trial number `trial` of `method` and reports it with its wall-clock time left at 0.
+/// Plays trial number `trial` of `method` and reports it.
 ///
 /// World, sensor noise, search, filter and suggestions have their own streams under the trial's seed, so methods share worlds and
 /// noise.
@@ -65,12 +71,15 @@ pub fn play(
     trial: u32,
 ) -> Result<(TrialRecord, Episode), Error> {
     let failed = |source: agent::Error| Error::Trial { trial, method: method.name(), source };
+    let started = Stopwatch::start();
     let seed = root.child(Purpose::World, u64::from(trial));
     let start = problem.sample_world(&mut seed.stream(Purpose::World, 0)).map_err(|e| failed(e.into()))?;
     let has_obstacle = start.theta.obstacle.is_some();
     let mut world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
-    let episode = Agent::new(problem, method, prior).and_then(|mut a| a.run(&mut world, seed)).map_err(failed)?;
-    Ok((record(method, trial, seed, has_obstacle, &episode), episode))
+    let mut timed = Timed::new(&mut world);
+    let episode = Agent::new(problem, method, prior).and_then(|mut a| a.run(&mut timed, seed)).map_err(failed)?;
+    let times = timed.times();
+    Ok((record(method, trial, seed, has_obstacle, &episode).timed(started, times), episode))
 }
 
 /// The same in an external world, which is asked for the scene of the trial. A world that fails ends the trial with a record, and the next
@@ -85,23 +94,26 @@ pub fn play_external(
     prior: Option<&Suggester>,
     root: Seed,
     trial: u32,
-    worlds: &Worlds<'_>,
+    worlds: &Worlds,
 ) -> Result<(TrialRecord, Episode), Error> {
     let failed = |source: agent::Error| Error::Trial { trial, method: method.name(), source };
+    let started = Stopwatch::start();
     let seed = root.child(Purpose::World, u64::from(trial));
     let mut agent = Agent::new(problem, method, prior).map_err(failed)?;
     let mut world = worlds.take(method, trial)?;
     let mut scene = world.episode(problem, trial, seed.0);
-    let episode = match agent.run(&mut scene, seed) {
+    let mut timed = Timed::new(&mut scene);
+    let episode = match agent.run(&mut timed, seed) {
         // What it first measured cannot be: an object inside the tool, for example.
         Err(agent::Error::Scenario(error)) => Episode::failed(format!("the first observation and the task: {error}")),
         played => played.map_err(failed)?,
     };
+    let times = timed.times();
     let has_obstacle = scene.has_obstacle().unwrap_or(false);
     if episode.failure.is_none() {
         worlds.give_back(world);
     }
-    Ok((record(method, trial, seed, has_obstacle, &episode), episode))
+    Ok((record(method, trial, seed, has_obstacle, &episode).timed(started, times), episode))
 }
 
 fn record(method: Method, trial: u32, seed: Seed, has_obstacle: bool, episode: &Episode) -> TrialRecord {
@@ -123,6 +135,15 @@ fn record(method: Method, trial: u32, seed: Seed, has_obstacle: bool, episode: &
         belief_errors: episode.belief_errors.clone(),
         failure: episode.failure.clone(),
         seconds: 0.0,
+        decision_seconds: 0.0,
+        slowest_decision_seconds: 0.0,
+    }
+}
+
+impl TrialRecord {
+    fn timed(self, started: Stopwatch, times: DecisionTimes) -> Self {
+        let (decision_seconds, slowest_decision_seconds) = (times.sum_secs, times.slowest_secs);
+        Self { seconds: started.seconds(), decision_seconds, slowest_decision_seconds, ..self }
     }
 }
 
@@ -150,6 +171,8 @@ pub(crate) mod tests {
             belief_errors: None,
             failure: None,
             seconds: 0.1,
+            decision_seconds: 0.08,
+            slowest_decision_seconds: 0.03,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The external worlds of a run: one for each thread that plays, fresh ones for those that failed.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use agent::{ExternalWorld, Method, Timeouts, WorldAddress, WorldError, WorldIdentity};
 use scenario::Problem;
@@ -8,22 +8,22 @@ use scenario::Problem;
 use crate::Error;
 
 /// Worlds that are not in use, and how to get another.
-pub struct Worlds<'a> {
+pub struct Worlds {
     address: WorldAddress,
     timeouts: Timeouts,
-    problem: &'a Problem,
+    problem: Arc<Problem>,
     identity: WorldIdentity,
     idle: Mutex<Vec<ExternalWorld>>,
 }
 
-impl<'a> Worlds<'a> {
+impl Worlds {
     /// Starts the first world, which says what all of them are.
     ///
     /// # Errors
     ///
     /// Where it does not start or is of no use for the problem.
-    pub fn start(address: WorldAddress, timeouts: Timeouts, problem: &'a Problem) -> Result<Self, WorldError> {
-        let first = ExternalWorld::start(&address, timeouts, problem)?;
+    pub fn start(address: WorldAddress, timeouts: Timeouts, problem: Arc<Problem>) -> Result<Self, WorldError> {
+        let first = ExternalWorld::start(&address, timeouts, &problem)?;
         let identity = first.identity().clone();
         Ok(Self { address, timeouts, problem, identity, idle: Mutex::new(vec![first]) })
     }
@@ -34,13 +34,18 @@ impl<'a> Worlds<'a> {
         &self.identity
     }
 
+    /// Ends the worlds that are not in use: trials that come much later start fresh ones.
+    pub fn rest(&self) {
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner).clear();
+    }
+
     /// A world for a trial.
     pub(crate) fn take(&self, method: Method, trial: u32) -> Result<ExternalWorld, Error> {
         let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
         if let Some(world) = idle {
             return Ok(world);
         }
-        let world = ExternalWorld::start(&self.address, self.timeouts, self.problem)
+        let world = ExternalWorld::start(&self.address, self.timeouts, &self.problem)
             .map_err(|source| Error::NoWorld { trial, method: method.name(), source })?;
         if *world.identity() != self.identity {
             let name = |identity: &WorldIdentity| format!("{} {}", identity.name, identity.version);

@@ -1,0 +1,59 @@
+//! Files and folders of runs: written whole or not at all, and never over what is not ours.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::Error;
+
+/// Writes a file whole or not at all.
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    let error = |e: whole_file::Error| Error::File { file: path.to_path_buf(), action: "writing", source: e.source };
+    whole_file::write(path, bytes, whole_file::Existing::Replace).map(|_| ()).map_err(error)
+}
+
+/// Plain data as JSON for people and machines.
+pub(crate) fn pretty<T: Serialize>(value: &T) -> String {
+    serde_json::to_string_pretty(value).expect("plain data has a JSON form") + "\n"
+}
+
+/// An [`Error::File`] from its cause.
+pub(crate) fn file_error(file: &Path, action: &'static str) -> impl FnOnce(std::io::Error) -> Error {
+    let file = file.to_path_buf();
+    move |source| Error::File { file, action, source }
+}
+
+/// Takes `folder`, made where it is missing, for the run that `identity` describes: the file `name` in it says so from then on. A folder
+/// of another run is refused, and one that holds any of the files `ours` and does not say whose they are.
+pub(crate) fn claim<T: Serialize>(folder: &Path, name: &'static str, identity: &T, ours: &[&str]) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(file_error(folder, "creating the folder"))?;
+    let file = folder.join(name);
+    match std::fs::read_to_string(&file) {
+        Ok(text) => check_identity(&file, &text, identity),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+            match ours.iter().map(|name| folder.join(name)).find(|file| file.exists()) {
+                Some(file) => Err(Error::Foreign { file, expected: name }),
+                None => write_atomically(&file, pretty(identity).as_bytes()),
+            }
+        }
+        Err(e) => Err(file_error(&file, "reading")(e)),
+    }
+}
+
+fn check_identity<T: Serialize>(file: &Path, text: &str, expected: &T) -> Result<(), Error> {
+    let found: Value = serde_json::from_str(text).unwrap_or(Value::Null);
+    let expected = serde_json::to_value(expected).expect("plain data has a JSON form");
+    for (key, value) in expected.as_object().expect("a struct is an object") {
+        let other = found.get(key).unwrap_or(&Value::Null);
+        if other != value {
+            return Err(Error::OtherRun {
+                file: file.to_path_buf(),
+                key: key.clone(),
+                found: other.to_string(),
+                expected: value.to_string(),
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,79 @@
+//! Plays what a run lacks, on all threads.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use agent::Method;
+use indicatif::{ProgressBar, ProgressStyle};
+use pomdp::Seed;
+use rayon::prelude::*;
+
+use crate::{Error, Evaluation, Run, TrialRecord, play, play_external};
+
+/// How trials are played. Nothing of it changes a result.
+#[derive(Clone, Copy, Debug)]
+pub struct Player<'a> {
+    /// Worker threads; all cores where `None`, one where all trials share a world behind a socket.
+    pub threads: Option<u32>,
+    /// Set when the run is to stop: trials that have begun end first.
+    pub interrupted: &'a AtomicBool,
+}
+
+impl Player<'_> {
+    /// Plays what is missing; false where it was interrupted.
+    ///
+    /// # Errors
+    ///
+    /// The first trial that cannot be played or kept. Finished ones are kept.
+    ///
+    /// # Panics
+    ///
+    /// Never: the template of the progress bar is fixed.
+    pub fn play(&self, evaluation: &Evaluation, run: &Run) -> Result<bool, Error> {
+        let missing = run.missing();
+        let bar = ProgressBar::new(missing.len() as u64);
+        let style = "{bar:40} {pos}/{len} trials, {per_sec}, {eta} left {msg}";
+        bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
+        bar.enable_steady_tick(Duration::from_millis(200));
+        // One robot behind a socket plays one trial at a time.
+        let threads = self.threads.unwrap_or(u32::from(evaluation.socket));
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build()?;
+        let failed = AtomicBool::new(false);
+        let stop = || self.interrupted.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed);
+        let one = |&(method, trial): &(Method, u32)| {
+            if stop() {
+                return Ok(());
+            }
+            let kept = play_one(evaluation, method, trial).and_then(|record| run.keep(&record).map(|()| record));
+            let record = kept.inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
+            report(&bar, &record);
+            Ok(())
+        };
+        let results: Vec<Result<(), Error>> = pool.install(|| missing.par_iter().with_max_len(1).map(one).collect());
+        bar.finish_and_clear();
+        results.into_iter().collect::<Result<Vec<()>, Error>>()?;
+        Ok(!self.interrupted.load(Ordering::Relaxed))
+    }
+}
+
+fn play_one(evaluation: &Evaluation, method: Method, trial: u32) -> Result<TrialRecord, Error> {
+    let Evaluation { problem, prior, worlds, .. } = evaluation;
+    let seed = Seed(evaluation.provenance.run.seed);
+    let played = match worlds {
+        Some(worlds) => play_external(problem, method, prior.as_ref(), seed, trial, worlds),
+        None => play(problem, method, prior.as_ref(), seed, trial),
+    };
+    Ok(played?.0)
+}
+
+/// A step of the progress bar, or a line where there is no terminal.
+fn report(bar: &ProgressBar, record: &TrialRecord) {
+    let TrialRecord { method, trial, reason, steps, seconds, failure, .. } = record;
+    if let Some(failure) = failure {
+        bar.suspend(|| eprintln!("{} trial {trial}: {failure}", method.name()));
+    }
+    bar.inc(1);
+    if bar.is_hidden() {
+        eprintln!("{} trial {trial}: {} after {steps} actions, {seconds:.1} s", method.name(), reason.name());
+    }
+}
