@@ -125,18 +125,20 @@ impl Table {
     #[must_use]
     pub fn to_markdown(&self) -> String {
         let mut text = String::from(
-            "| domain | robot | preset | method | success | 95 % interval | paper | ended by | steps to goal | obstacle touched |\n\
-             |---|---|---|---|---|---|---|---|---|---|\n",
+            "| domain | robot | preset | method | success | 95 % interval | paper | ended by | failed by | steps to goal | obstacle touched |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|\n",
         );
         for row in &self.rows {
             let published = row.published.map_or("–".into(), |p| format!("{}/{}", p.successes, p.trials));
             let reasons: Vec<String> =
                 row.reasons.iter().map(|(reason, count)| format!("{} {count}", reason.name())).collect();
+            let failures: Vec<String> = row.failures.iter().map(|(f, count)| format!("{} {count}", f.name())).collect();
+            let failures = if failures.is_empty() { "–".into() } else { failures.join(", ") };
             let steps = row.mean_steps_to_goal.map_or("–".into(), |s| format!("{s:.1}"));
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {} | {}/{} | {:.2}–{:.2} | {} | {} | {} | {} of {} |",
+                "| {} | {} | {} | {} | {}/{} | {:.2}–{:.2} | {} | {} | {failures} | {} | {} of {} |",
                 row.domain,
                 row.robot,
                 row.preset,
@@ -168,14 +170,15 @@ impl Table {
     pub fn to_csv(&self) -> String {
         let mut text = String::from(
             "domain,robot,preset,method,successes,trials,interval95_low,interval95_high,published_successes,published_trials,\
-             mean_return,mean_steps_to_goal,mean_depletions,transitions_per_action,with_obstacle,obstacle_touched\n",
+             mean_return,mean_steps_to_goal,mean_depletions,transitions_per_action,with_obstacle,obstacle_touched,mean_large_forces,\
+             mean_out_of_reach\n",
         );
         for row in &self.rows {
             let published = row.published.map_or(",".into(), |p| format!("{},{}", p.successes, p.trials));
             let steps = row.mean_steps_to_goal.map_or(String::new(), |s| s.to_string());
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 row.domain,
                 row.robot,
                 row.preset,
@@ -191,6 +194,8 @@ impl Table {
                 row.transitions_per_action,
                 row.with_obstacle,
                 row.obstacle_touched,
+                row.mean_large_forces,
+                row.mean_out_of_reach,
             );
         }
         text
