@@ -23,6 +23,41 @@ pub enum Error {
     /// No threads to play on.
     #[error("the threads that play trials cannot be started")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// A plan of tables that says what cannot be.
+    #[error("{file}: {problem}")]
+    Plan {
+        /// File.
+        file: PathBuf,
+        /// Key, expectation and value.
+        problem: String,
+    },
+    /// A name that chooses no run.
+    #[error("--only {name}: no such table or run `{name}`: expected some of {known}")]
+    Only {
+        /// What was asked for.
+        name: String,
+        /// What exists.
+        known: String,
+    },
+    /// A run whose worlds are not those of the runs beside it.
+    #[error("{file}: run `{run}` changes the worlds or the task of {domain}: expected overrides of the method alone")]
+    OtherWorlds {
+        /// The table's file.
+        file: PathBuf,
+        /// Run.
+        run: String,
+        /// Domain.
+        domain: String,
+    },
+    /// A picture cannot be drawn.
+    #[error("figure {name}")]
+    Figure {
+        /// Its name.
+        name: String,
+        /// Cause.
+        #[source]
+        source: figures::Error,
+    },
     /// The folder belongs to another run.
     #[error("{file}: key `{key}` is {found}, this run has {expected}: choose another --out or remove the folder")]
     OtherRun {
