@@ -1,5 +1,6 @@
 //! End-to-end suite.
 
+mod all;
 mod architecture;
 mod bad_input;
 mod pipeline;

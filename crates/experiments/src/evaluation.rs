@@ -105,6 +105,13 @@ impl Evaluation {
         format!("{}-{}-{}{world}", s.name, s.robot.name, s.preset)
     }
 
+    /// Ends what only waits: a world that was started to learn what it is.
+    pub fn rest(&self) {
+        if let Some(worlds) = &self.worlds {
+            worlds.rest();
+        }
+    }
+
     /// Opens or creates the run directory `folder`.
     ///
     /// # Errors

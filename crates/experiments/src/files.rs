@@ -26,7 +26,12 @@ pub(crate) fn file_error(file: &Path, action: &'static str) -> impl FnOnce(std::
 
 /// Takes `folder`, made where it is missing, for the run that `identity` describes: the file `name` in it says so from then on. A folder
 /// of another run is refused, and one that holds any of the files `ours` and does not say whose they are.
-pub(crate) fn claim<T: Serialize>(folder: &Path, name: &'static str, identity: &T, ours: &[&str]) -> Result<(), Error> {
+pub(crate) fn claim<T: Serialize>(
+    folder: &Path,
+    name: &'static str,
+    identity: &T,
+    ours: &[impl AsRef<Path>],
+) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(file_error(folder, "creating the folder"))?;
     let file = folder.join(name);
     match std::fs::read_to_string(&file) {

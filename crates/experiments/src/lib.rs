@@ -2,29 +2,40 @@
 //!
 //! A run directory holds `run.json` (what the run is), `scenario.toml` (resolved), `trials.jsonl` (one line a trial) and, when all
 //! trials are done, `table.json`, `table.md` and `table.csv`. Finished trials are never redone.
+//!
+//! An [`Evaluation`] is one run, a [`Player`] plays what it lacks, a [`Suite`] is all runs of a [`Plan`] and puts them side by side
+//! ([`Combined`]). What depends on the clock stands at the end of a trial's line and in files of its own.
 
 mod clock;
+mod combined;
 mod error;
 mod evaluation;
 mod failure;
 mod files;
 mod interval;
+mod learning;
+mod pace;
 mod paired;
+mod pictures;
 mod plan;
 mod player;
 mod run;
+mod suite;
 mod table;
 mod trial;
 mod worlds;
 
+pub use combined::{Arm, Combined, CombinedRow, Common, Comparison, Source, Sources, Total};
 pub use error::Error;
 pub use evaluation::{Evaluation, Request};
 pub use failure::Failure;
 pub use interval::wilson95;
+pub use pace::Pace;
 pub use paired::Pair;
 pub use plan::{Include, Item, Plan, Pool, RunPlan, TablePlan};
 pub use player::Player;
 pub use run::{Provenance, Run, RunIdentity};
+pub use suite::{Suite, SuiteRequest};
 pub use table::{Row, Table};
 pub use trial::{TrialRecord, play, play_external};
 pub use worlds::Worlds;

@@ -1,4 +1,4 @@
-//! `cargo xtask eval`: trials of methods on a domain, to a table.
+//! `cargo xtask eval`: trials of methods on a domain, or of all domains, to tables.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -9,16 +9,28 @@ use std::time::Duration;
 use agent::{Method, Timeouts, WorldAddress};
 use anyhow::{Context as _, Result};
 use clap::Parser;
-use experiments::{Evaluation, Player, Request};
+use experiments::{Evaluation, Player, Request, Suite, SuiteRequest};
 use scenario::Selection;
 
-/// Plays trials of methods on a domain and prints the table.
+/// Plays trials of methods on a domain, or all tables with --all, and prints the table.
 #[derive(Debug, Parser)]
 #[command(name = "eval", version)]
 struct Arguments {
     /// Domain: D1 to D5, obstacle, or a scenario file.
-    #[arg(long)]
-    domain: String,
+    #[arg(long, required_unless_present = "all")]
+    domain: Option<String>,
+    /// All tables of scenarios/tables, with their pictures.
+    #[arg(long, conflicts_with_all = ["domain", "robot", "preset", "methods", "world"])]
+    all: bool,
+    /// With --all: plays these tables (table1), runs (table1-paper) or run directories (table1-paper-D3) alone, separated by commas.
+    #[arg(long, value_delimiter = ',', requires = "all")]
+    only: Vec<String>,
+    /// With --all: Python with mujoco and numpy, for the runs in MuJoCo, which are left out without.
+    #[arg(long, default_value = "python3", requires = "all")]
+    python: String,
+    /// With --all: copies the combined tables and pictures to assets/results.
+    #[arg(long, requires = "all", conflicts_with = "quick")]
+    publish: bool,
     /// Arm: sawyer or jaco.
     #[arg(long, default_value = "sawyer")]
     robot: String,
@@ -60,7 +72,7 @@ struct Arguments {
     /// Folder of the trained prior [default: the one trained here with the same --quick, else the shipped one].
     #[arg(long)]
     prior: Option<PathBuf>,
-    /// Run directory [default: runs/eval/DOMAIN-ROBOT-PRESET, runs/quick/eval/… with --quick].
+    /// Run directory [default: runs/eval/DOMAIN-ROBOT-PRESET, or runs/all with --all; runs/quick/… with --quick].
     #[arg(long)]
     out: Option<PathBuf>,
     /// Project folder [default: the nearest one above with scenarios/base.toml].
@@ -104,7 +116,14 @@ fn run(arguments: &Arguments) -> Result<bool> {
         Some(root) => root.clone(),
         None => scenario::find_root(&std::env::current_dir()?)?,
     };
-    let evaluation = Evaluation::prepare(&request(arguments, &root))?;
+    match &arguments.domain {
+        Some(domain) => run_one(arguments, &root, domain),
+        None => run_all(arguments, &root),
+    }
+}
+
+fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
+    let evaluation = Evaluation::prepare(&request(arguments, root, domain))?;
     if let Some(folder) = evaluation.prior_folder() {
         eprintln!("prior: {}", folder.display());
     }
@@ -130,12 +149,55 @@ fn run(arguments: &Arguments) -> Result<bool> {
     Ok(true)
 }
 
-fn request(arguments: &Arguments, root: &Path) -> Request {
+fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
+    let default = || root.join(if arguments.quick { "runs/quick/all" } else { "runs/all" });
+    let out = arguments.out.clone().unwrap_or_else(default);
+    let request = SuiteRequest {
+        root: root.to_path_buf(),
+        out: out.clone(),
+        only: arguments.only.clone(),
+        trials: arguments.trials,
+        seed: arguments.seed,
+        quick: arguments.quick,
+        set: arguments.set.clone(),
+        prior: arguments.prior.clone(),
+        python: arguments.python.clone(),
+        timeouts: timeouts(arguments),
+    };
+    let mut note = |text: &str| eprintln!("{text}");
+    let suite = Suite::prepare(request, &mut note)?;
+    let interrupted = listen_for_interrupts()?;
+    let player = Player { threads: arguments.threads, interrupted: &interrupted };
+    if !suite.play(&player, &mut note).context(Failed)? {
+        return Ok(false);
+    }
+    let tables = suite.combine().context(Failed)?;
+    if arguments.json {
+        println!("{}", serde_json::to_string(&tables)?);
+    } else {
+        for table in &tables {
+            println!("{}", table.to_markdown());
+        }
+        eprintln!("written to {}", out.display());
+    }
+    if arguments.publish {
+        let to = root.join("assets/results");
+        suite.publish(&to).context(Failed)?;
+        eprintln!("published to {}", to.display());
+    }
+    Ok(true)
+}
+
+fn timeouts(arguments: &Arguments) -> Timeouts {
     let (start, reset, act) = (arguments.world_start_secs, arguments.world_reset_secs, arguments.world_act_secs);
+    Timeouts { start, reset, act }
+}
+
+fn request(arguments: &Arguments, root: &Path, domain: &str) -> Request {
     Request {
         selection: Selection {
             root: root.to_path_buf(),
-            domain: arguments.domain.clone(),
+            domain: domain.into(),
             robot: arguments.robot.clone(),
             preset: arguments.preset.clone(),
             quick: arguments.quick,
@@ -145,7 +207,7 @@ fn request(arguments: &Arguments, root: &Path) -> Request {
         trials: arguments.trials,
         seed: arguments.seed,
         prior: arguments.prior.clone(),
-        world: arguments.world.clone().map(|address| (address, Timeouts { start, reset, act })),
+        world: arguments.world.clone().map(|address| (address, timeouts(arguments))),
     }
 }
 

@@ -28,33 +28,61 @@ pub struct Pair {
 }
 
 impl Pair {
-    fn new(first: Method, second: Method, outcomes: impl Iterator<Item = (bool, bool)>) -> Self {
-        let mut pair = Self { first, second, both: 0, first_only: 0, second_only: 0, neither: 0, p: 1.0 };
-        for outcome in outcomes {
-            let count = match outcome {
-                (true, true) => &mut pair.both,
-                (true, false) => &mut pair.first_only,
-                (false, true) => &mut pair.second_only,
-                (false, false) => &mut pair.neither,
-            };
-            *count += 1;
+    fn new(first: Method, second: Method, cells: Cells) -> Self {
+        let Cells { both, first_only, second_only, neither } = cells;
+        Self { first, second, both, first_only, second_only, neither, p: cells.p() }
+    }
+}
+
+/// Trials of a run.
+pub(crate) type Trials = BTreeMap<(Method, u32), TrialRecord>;
+
+/// Numbers of worlds by which of two solved them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Cells {
+    pub(crate) both: u32,
+    pub(crate) first_only: u32,
+    pub(crate) second_only: u32,
+    pub(crate) neither: u32,
+}
+
+impl Cells {
+    /// Two methods, of one run or of two, over the worlds that both have played: those of the same number.
+    pub(crate) fn of(first: (&Trials, Method), second: (&Trials, Method)) -> Self {
+        let mut cells = Self::default();
+        for ((_, trial), one) in first.0.range((first.1, 0)..=(first.1, u32::MAX)) {
+            let Some(other) = second.0.get(&(second.1, *trial)) else { continue };
+            match (one.success, other.success) {
+                (true, true) => cells.both += 1,
+                (true, false) => cells.first_only += 1,
+                (false, true) => cells.second_only += 1,
+                (false, false) => cells.neither += 1,
+            }
         }
-        pair.p = mcnemar(pair.first_only, pair.second_only);
-        pair
+        cells
+    }
+
+    /// The worlds of both.
+    pub(crate) fn plus(self, other: Self) -> Self {
+        Self {
+            both: self.both + other.both,
+            first_only: self.first_only + other.first_only,
+            second_only: self.second_only + other.second_only,
+            neither: self.neither + other.neither,
+        }
+    }
+
+    pub(crate) fn p(self) -> f64 {
+        mcnemar(self.first_only, self.second_only)
     }
 }
 
 /// Every pair of `methods`, in their order, over the worlds that both have played.
-pub(crate) fn pairs(methods: &[Method], trials: &BTreeMap<(Method, u32), TrialRecord>) -> Vec<Pair> {
+pub(crate) fn pairs(methods: &[Method], trials: &Trials) -> Vec<Pair> {
     let mut pairs = Vec::new();
     for (index, &first) in methods.iter().enumerate() {
         for &second in &methods[index + 1..] {
-            let played = trials.range((first, 0)..=(first, u32::MAX));
-            let outcomes = played.filter_map(|((_, trial), one)| {
-                let other = trials.get(&(second, *trial))?;
-                Some((one.success, other.success))
-            });
-            pairs.push(Pair::new(first, second, outcomes));
+            pairs.push(Pair::new(first, second, Cells::of((trials, first), (trials, second))));
         }
     }
     pairs
@@ -80,10 +108,29 @@ mod tests {
     }
 
     #[test]
-    fn every_world_falls_into_one_of_four_cells() {
+    fn every_world_that_both_played_falls_into_one_of_four_cells() {
         let outcomes = [(true, true), (true, false), (true, false), (false, true), (false, false)];
-        let pair = Pair::new(Method::NoRnn, Method::RnnMax, outcomes.into_iter());
+        let mut trials = Trials::new();
+        for (trial, (first, second)) in (0_u32..).zip(outcomes) {
+            for (method, success) in [(Method::NoRnn, first), (Method::RnnMax, second)] {
+                trials.insert((method, trial), TrialRecord { method, trial, success, ..crate::trial::tests::record() });
+            }
+        }
+        // A world that one of them has not played yet.
+        trials.insert((Method::NoRnn, 9), crate::trial::tests::record());
+        let pair = &pairs(&[Method::NoRnn, Method::RnnMax], &trials)[0];
         assert_eq!((pair.both, pair.first_only, pair.second_only, pair.neither), (1, 2, 1, 1));
         assert_eq!(pair.p, 1.0);
+    }
+
+    #[test]
+    fn pooled_worlds_add_up_before_they_are_tested() {
+        let cells = |first_only, second_only| Cells { both: 1, first_only, second_only, neither: 2 };
+        let (d1, d2) = (cells(4, 0), cells(2, 1));
+        // Alone 2 / 2^4 and 2 (1 + 3) / 2^3; together 2 (1 + 7) / 2^7.
+        assert!((d1.p() - 0.125).abs() < 1e-12 && (d2.p() - 1.0).abs() < 1e-12);
+        let both = d1.plus(d2);
+        assert_eq!(both, Cells { both: 2, first_only: 6, second_only: 1, neither: 4 });
+        assert!((both.p() - 0.125).abs() < 1e-12);
     }
 }

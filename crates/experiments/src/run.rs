@@ -108,6 +108,17 @@ impl Run {
         written.map_err(file_error(&self.folder.join("trials.jsonl"), "writing"))
     }
 
+    /// All trials that are finished by now.
+    ///
+    /// # Errors
+    ///
+    /// Where the file cannot be read.
+    pub fn trials(&self) -> Result<BTreeMap<(Method, u32), TrialRecord>, Error> {
+        let mut trials = read_trials(&self.folder.join("trials.jsonl"))?;
+        trials.retain(|(_, trial), _| *trial < self.provenance.trials);
+        Ok(trials)
+    }
+
     /// Writes the tables from all trials, in order.
     ///
     /// # Errors
