@@ -228,6 +228,21 @@ pub struct PerturbConfig {
     pub size_m: f64,
 }
 
+/// What the model takes to be its own error in one action: standard deviations of Gaussians that a filter on continuous observations adds to the
+/// simulated end of the action, whose pose it then corrects by the measured one. 0 is an exact model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelErrorConfig {
+    /// x and y of the object, m.
+    pub position_m: f64,
+    /// Yaw of the object, rad.
+    pub yaw_rad: f64,
+    /// Wrist force and torque, each component, as a share of the simulated magnitude.
+    pub force_share: f64,
+    /// Each joint torque, N·m.
+    pub joint_torque_nm: f64,
+}
+
 /// Everything that turns (s, Θ, action) into a transition.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -242,6 +257,8 @@ pub struct PushConfig {
     pub sensor: SensorConfig,
     /// Noise of reinvigoration.
     pub perturb: PerturbConfig,
+    /// What the model takes to be its own error.
+    pub model_error: ModelErrorConfig,
     /// Effects beyond rigid bodies with Coulomb friction.
     pub effects: Vec<EffectConfig>,
 }

@@ -40,6 +40,7 @@ mod friction;
 pub mod goal;
 pub mod heuristic;
 pub mod model;
+mod model_error;
 mod motion;
 pub mod parameters;
 mod perturb;

@@ -12,6 +12,7 @@ use crate::effect::{Effect, EffectConfig};
 use crate::error::Impossible;
 use crate::feasible::{check_overlaps, check_theta, nothing_happens, parts_in_reach};
 use crate::force::{ForceSensor, resting_reading};
+use crate::model_error;
 use crate::motion::JointPath;
 use crate::perturb;
 use crate::reward::Events;
@@ -415,7 +416,17 @@ impl GenerativeModel for PushModel {
 
 impl ObservationModel for PushModel {
     fn log_likelihood(&self, _action: &Action, next: &Particle, observation: &Observation) -> f64 {
-        self.config.sensor.log_likelihood(observation, &self.readings(next))
+        self.config.sensor.log_likelihood(observation, &self.readings(next), &self.config.model_error)
+    }
+
+    fn correct(&self, next: &mut Particle, observation: &Observation, rng: &mut Rng) {
+        let object =
+            model_error::corrected(&self.config.model_error, &self.config.sensor.noise, next, observation, rng);
+        let moved = Particle { state: State { object, ..next.state.clone() }, ..next.clone() };
+        // Measured into something else: the simulated pose stays.
+        if self.check(&moved).is_ok() {
+            *next = moved;
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ForceSensing, SensorConfig};
+use crate::config::{ForceSensing, ModelErrorConfig, SensorConfig};
 use crate::state::BodyState;
 use pomdp::Rng;
 
@@ -149,9 +149,9 @@ impl SensorConfig {
         ObservationKey(key)
     }
 
-    /// ln p(observation | readings): Gaussian noise on every value.
+    /// ln p(observation | readings): Gaussian noise on every value, and on some the model's own error.
     #[must_use]
-    pub fn log_likelihood(&self, observation: &Observation, readings: &Readings) -> f64 {
+    pub fn log_likelihood(&self, observation: &Observation, readings: &Readings, error: &ModelErrorConfig) -> f64 {
         let noise = &self.noise;
         let values = &observation.0;
         let joints = readings.joints_rad.len();
@@ -165,24 +165,31 @@ impl SensorConfig {
                 for (value, q) in values.iter().zip(&readings.joints_rad) {
                     add(value - q, noise.joint_rad);
                 }
-                let stddevs = [[noise.force_n; 3], [noise.torque_nm; 3]].concat();
-                for ((value, force), stddev) in values[joints..].iter().zip(readings.force).zip(stddevs) {
-                    add(value - force, stddev);
+                let magnitude = |from: usize| readings.force[from..from + 3].iter().map(|f| f * f).sum::<f64>().sqrt();
+                for (from, stddev) in [(0, noise.force_n), (3, noise.torque_nm)] {
+                    let stddev = stddev.hypot(error.force_share * magnitude(from));
+                    for (value, force) in values[joints + from..].iter().zip(&readings.force[from..from + 3]) {
+                        add(value - force, stddev);
+                    }
                 }
             }
             ForceSensing::JointTorques => {
+                let stddev = noise.joint_torque_nm.hypot(error.joint_torque_nm);
                 for (value, torque) in values.iter().zip(&readings.force[..joints]) {
-                    add(value - torque, noise.joint_torque_nm);
+                    add(value - torque, stddev);
                 }
             }
         }
         let (position, orientation) = observation.object_pose();
-        for (value, p) in position.iter().zip(readings.object.position_m) {
-            add(value - p, noise.position_m);
+        let horizontal = noise.position_m.hypot(error.position_m);
+        let stddevs = [horizontal, horizontal, noise.position_m];
+        for ((value, p), stddev) in position.iter().zip(readings.object.position_m).zip(stddevs) {
+            add(value - p, stddev);
         }
-        let error = unit(orientation) * unit(readings.object.orientation).inverse();
-        for component in error.scaled_axis().iter() {
-            add(*component, noise.orientation_rad);
+        let turn = unit(orientation) * unit(readings.object.orientation).inverse();
+        let stddevs = [noise.orientation_rad, noise.orientation_rad, noise.orientation_rad.hypot(error.yaw_rad)];
+        for (component, stddev) in turn.scaled_axis().iter().zip(stddevs) {
+            add(*component, stddev);
         }
         total
     }
@@ -200,7 +207,7 @@ fn discretise(value: f64, range: f64) -> u8 {
     (share * BINS).floor() as u8
 }
 
-fn unit([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
+pub(crate) fn unit([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
 
@@ -298,7 +305,9 @@ mod tests {
         let mut rng = Seed(2).stream(Purpose::Test, 0);
         // E[ln p] of a Gaussian of dimension d with the 20 → 19 free values: −d/2 (1 + ln 2π) − Σ ln σ.
         let n = 2000;
-        let mean = (0..n).map(|_| sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &truth)).sum::<f64>()
+        let mean = (0..n)
+            .map(|_| sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &truth, &ModelErrorConfig::default()))
+            .sum::<f64>()
             / f64::from(n);
         let log_stddevs = 7.0 * 0.001_f64.ln()
             + 3.0 * 0.5_f64.ln()
@@ -307,6 +316,41 @@ mod tests {
             + 3.0 * 0.01_f64.ln();
         let expected = -19.0 / 2.0 * (1.0 + (2.0 * std::f64::consts::PI).ln()) - log_stddevs;
         // Stddev of ln p is sqrt(d / 2) = 3.1: four standard errors.
+        assert!((mean - expected).abs() < 4.0 * 3.1 / f64::from(n).sqrt(), "{mean} {expected}");
+    }
+
+    #[test]
+    fn likelihood_with_an_error_of_the_model_is_the_density_of_error_and_noise() {
+        let sensor = sensor(ForceSensing::Wrist);
+        let simulated = readings(7);
+        let error = ModelErrorConfig { position_m: 0.003, yaw_rad: 0.02, force_share: 0.3, joint_torque_nm: 1.0 };
+        let mut rng = Seed(3).stream(Purpose::Test, 0);
+        let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let shares = [0.3 * size(&simulated.force[..3]), 0.3 * size(&simulated.force[3..])];
+        let n = 2000;
+        let mut total = 0.0;
+        for _ in 0..n {
+            let mut truth = simulated.clone();
+            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+            for (i, force) in truth.force.iter_mut().enumerate() {
+                *force += shares[i / 3] * normal();
+            }
+            truth.object.position_m[0] += 0.003 * normal();
+            truth.object.position_m[1] += 0.003 * normal();
+            let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, 0.02 * normal()));
+            let turned = turn * unit(truth.object.orientation);
+            truth.object.orientation = [turned.i, turned.j, turned.k, turned.w];
+            total += sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &simulated, &error);
+        }
+        let mean = total / f64::from(n);
+        let log_stddevs = 7.0 * 0.001_f64.ln()
+            + 3.0 * 0.5_f64.hypot(shares[0]).ln()
+            + 3.0 * 0.05_f64.hypot(shares[1]).ln()
+            + 2.0 * 0.002_f64.hypot(0.003).ln()
+            + 0.002_f64.ln()
+            + 2.0 * 0.01_f64.ln()
+            + 0.01_f64.hypot(0.02).ln();
+        let expected = -19.0 / 2.0 * (1.0 + (2.0 * std::f64::consts::PI).ln()) - log_stddevs;
         assert!((mean - expected).abs() < 4.0 * 3.1 / f64::from(n).sqrt(), "{mean} {expected}");
     }
 }

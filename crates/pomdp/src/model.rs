@@ -47,7 +47,14 @@ pub trait GenerativeModel {
 /// A model whose observation density can be evaluated.
 pub trait ObservationModel: GenerativeModel {
     /// ln p(o | a, s'); −∞ for an impossible observation.
+    ///
+    /// A model that knows its own error takes the state after the action to be s' plus that error, and integrates it out here.
     fn log_likelihood(&self, action: &Self::Action, next: &Self::State, observation: &Self::Observation) -> f64;
+
+    /// Draws the error that [`Self::log_likelihood`] integrates out from its posterior given `observation`, and adds it to the simulated
+    /// state: a filter that does so to what it keeps uses the optimal proposal for this error (Doucet, Godsill and Andrieu 2000). Nothing
+    /// for a model that takes itself to be exact.
+    fn correct(&self, _next: &mut Self::State, _observation: &Self::Observation, _rng: &mut Rng) {}
 }
 
 /// A model whose observations fall into discrete classes: the branches of the search tree and the acceptance test of the

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use physics_model::WorldDistribution;
 use physics_model::config::{
-    ArmConfig, ObstacleMobility, PerturbConfig, PushConfig, SensorConfig, TaskConfig, WorldConfig,
+    ArmConfig, ModelErrorConfig, ObstacleMobility, PerturbConfig, PushConfig, SensorConfig, TaskConfig, WorldConfig,
 };
 use physics_model::effect::EffectConfig;
 use physics_model::robot::RobotConfig;
@@ -40,6 +40,8 @@ pub struct Scenario {
     pub sensor: SensorConfig,
     /// Noise of reinvigoration.
     pub perturb: PerturbConfig,
+    /// What the model takes to be its own error.
+    pub model_error: ModelErrorConfig,
     /// Worlds.
     pub distribution: WorldDistribution,
     /// What the robot believes at first.
@@ -202,6 +204,7 @@ impl Scenario {
             task: self.task.clone(),
             sensor: self.sensor.clone(),
             perturb: self.perturb.clone(),
+            model_error: self.model_error,
             effects: effects.to_vec(),
         }
     }
@@ -270,6 +273,10 @@ impl Scenario {
             ("perturb.com_m", p.com_m),
             ("perturb.friction", p.friction),
             ("perturb.size_m", p.size_m),
+            ("model_error.position_m", self.model_error.position_m),
+            ("model_error.yaw_rad", self.model_error.yaw_rad),
+            ("model_error.force_share", self.model_error.force_share),
+            ("model_error.joint_torque_nm", self.model_error.joint_torque_nm),
         ];
         let rewards =
             [t.reward.step, t.reward.large_force, t.reward.out_of_reach, t.reward.object_moved, t.reward.goal];

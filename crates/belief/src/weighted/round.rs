@@ -273,8 +273,13 @@ impl<M: Trackable> Round<'_, M> {
             moved = smoothed.iter().filter(|(_, moved)| *moved).count();
             smoothed.into_iter().map(|(state, _)| state).collect()
         } else {
-            chosen.iter().map(|&(i, _)| walkers[i].next.clone()).collect()
+            chosen.iter().map(|&(i, _)| walkers[i].next.clone()).collect::<Vec<_>>()
         };
+        let states = each(states.len(), rng, |at, rng| {
+            let mut state = states[at].clone();
+            self.model.correct(&mut state, self.observation, rng);
+            state
+        });
         let structures = self.prediction.structures.iter().cloned().zip(&self.prediction.mass).zip(mass).zip(particles);
         Advance {
             states,

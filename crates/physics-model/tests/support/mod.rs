@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use physics_model::config::{
-    ArmConfig, ForceSensing, GoalConfig, NoiseConfig, ObstacleMobility, PerturbConfig, ReachConfig, RewardConfig,
-    SensorConfig, TaskConfig, WorldConfig,
+    ArmConfig, ForceSensing, GoalConfig, ModelErrorConfig, NoiseConfig, ObstacleMobility, PerturbConfig, ReachConfig,
+    RewardConfig, SensorConfig, TaskConfig, WorldConfig,
 };
 use physics_model::robot::{Robot, RobotConfig};
 use physics_model::{PushConfig, PushModel};
@@ -78,6 +78,7 @@ pub(crate) fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f6
             friction: 0.05,
             size_m: 0.005,
         },
+        model_error: ModelErrorConfig::default(),
         effects: vec![],
     };
     let model = PushModel::new(push, robot);
