@@ -16,6 +16,8 @@ use rapier3d::prelude::{
 };
 
 use crate::config::ServoConfig;
+use crate::effect::Hooks;
+use crate::loads::Effects;
 use crate::robot::{ArmBody, JointVector, Robot};
 use crate::world::{pose, vector};
 
@@ -111,16 +113,24 @@ impl<'a> Arm<'a> {
                 *slot = *value as f32;
             }
         }
-        arm.command(physics, joints_rad);
+        arm.command(physics, Effects::new(&[]), joints_rad);
         arm
     }
 
-    /// Commands that the joints be at `joints_rad` at the end of the coming control step.
-    pub(crate) fn command(&mut self, physics: &mut PhysicsWorld, joints_rad: &[f64]) {
+    /// Commands that the joints be at `joints_rad` at the end of the coming control step. Friction in the joints, if an effect has it, works
+    /// against the servos.
+    pub(crate) fn command(&mut self, physics: &mut PhysicsWorld, effects: Effects, joints_rad: &[f64]) {
         let mut target = self.start_rad;
         target.as_mut_slice()[..joints_rad.len()].copy_from_slice(joints_rad);
         let rate = (target - self.commanded_rad) / self.period_secs;
-        let torque = self.robot.mass_matrix(joints_rad) * (rate - self.commanded_rps) / self.period_secs;
+        let mut torque = self.robot.mass_matrix(joints_rad) * (rate - self.commanded_rps) / self.period_secs;
+        if effects.hooks.contains(Hooks::JOINT_FRICTION) {
+            let mut friction = JointVector::zeros();
+            for effect in effects.list {
+                effect.joint_friction(&rate.as_slice()[..joints_rad.len()], &mut friction);
+            }
+            torque -= friction;
+        }
         // Rapier holds the springs' rest positions over its substeps, at whose ends a joint that follows the command has gone
         // 1/n, 2/n, … 1 of the way: the rest positions take the mean, so that the springs' mean torque is 0.
         let share = (self.substeps + 1.0) / (2.0 * self.substeps);

@@ -19,8 +19,9 @@ use crate::world::{ToolPose, Wrench, array, pose, vector};
 
 /// Overlap, m, that soft contacts reach where nothing blocks the push.
 const FREE_OVERLAP_M: f32 = 0.002;
-/// Bodies that a tool can touch: object and obstacle. The table is no collider to it (see [`table_wrench`]).
-const BODIES: usize = 2;
+/// Most bodies that a tool can be told to touch: object, obstacle and two that only effects know of. The table is no collider to it (see
+/// [`table_wrench`]).
+const BODIES: usize = 4;
 
 /// What the tool's contacts with one body amount to.
 #[derive(Clone, Copy)]

@@ -37,3 +37,43 @@ pub enum Impossible {
         limit_m: f64,
     },
 }
+
+/// What is wrong with an effect's description.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum EffectError {
+    /// No effect has this name.
+    #[error("effect {name:?} does not exist: {known} do")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// All names.
+        known: String,
+    },
+    /// A vector of parameters has another length.
+    #[error("{effect} has {expected} parameters, found {found} values")]
+    Count {
+        /// Name of the effect.
+        effect: &'static str,
+        /// How many parameters it has.
+        expected: usize,
+        /// How many values were given.
+        found: usize,
+    },
+    /// A parameter is outside its physical limits.
+    #[error("{effect}.{key}: expected {low} to {high}{}{unit}, found {value}", if .unit.is_empty() { "" } else { " " })]
+    OutOfRange {
+        /// Name of the effect.
+        effect: &'static str,
+        /// Key of the parameter.
+        key: &'static str,
+        /// The value.
+        value: f64,
+        /// Smallest possible.
+        low: f64,
+        /// Largest possible.
+        high: f64,
+        /// Unit, empty for a ratio.
+        unit: &'static str,
+    },
+}

@@ -3,12 +3,13 @@
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::prelude::{Pose, SharedShape, Vector};
 
+use crate::bodies::{shape_axis_angle, shared_shape};
 use crate::config::{ObstacleMobility, WorldConfig};
 use crate::error::Impossible;
 use crate::robot::ToolShape;
 use crate::state::BodyState;
 use crate::theta::{ObjectShape, Theta};
-use crate::world::{ToolPose, pose, shape_axis_angle, shared_shape, vector};
+use crate::world::{ToolPose, pose, vector};
 
 /// Deepest overlap, m, at which two bodies may be restored: what soft contacts reach in a hard push, and no more.
 pub const OVERLAP_LIMIT_M: f64 = 0.006;

@@ -3,6 +3,9 @@
 use nalgebra::{Vector3, Vector6};
 
 use crate::config::{ForceSensing, SensorConfig};
+use crate::effect::signal::ForceChain;
+use crate::effect::{Hooks, ToolMoment};
+use crate::loads::Effects;
 use crate::motion::{JointMoment, JointPath};
 use crate::robot::Robot;
 use crate::world::Wrench;
@@ -11,6 +14,9 @@ use crate::world::Wrench;
 pub(crate) struct ForceSensor<'a> {
     robot: &'a Robot,
     config: &'a SensorConfig,
+    effects: Effects<'a>,
+    /// What effects make of the readings.
+    chain: Option<ForceChain>,
     /// Joint torques need the joints' motion, a wrist sensor does not.
     path: Option<JointPath>,
     samples: u32,
@@ -24,39 +30,62 @@ impl<'a> ForceSensor<'a> {
         config.force == ForceSensing::JointTorques
     }
 
-    /// A sensor that has read nothing yet. `path` where [`Self::needs_path`].
-    pub(crate) fn new(robot: &'a Robot, config: &'a SensorConfig, path: Option<JointPath>) -> Self {
-        Self { robot, config, path, samples: 0, wrench: Wrench::default(), torques_nm: [0.0; 6] }
+    /// A sensor that has read nothing yet, every `period_secs`. `path` where [`Self::needs_path`].
+    pub(crate) fn new(
+        robot: &'a Robot,
+        config: &'a SensorConfig,
+        effects: Effects<'a>,
+        period_secs: f64,
+        path: Option<JointPath>,
+    ) -> Self {
+        let chain = ForceChain::new(effects.list, period_secs);
+        let path = path.filter(|_| Self::needs_path(config));
+        Self { robot, config, effects, chain, path, samples: 0, wrench: Wrench::default(), torques_nm: [0.0; 6] }
+    }
+
+    /// Whether the sensor asks for the tool's motion.
+    pub(crate) fn reads_motion(&self) -> bool {
+        self.chain.is_some()
     }
 
     /// Adds a control step at whose end the arm is after the share `time` of an action that takes `duration_secs`, with the mean
-    /// `wrench` on the tool. Returns whether the force at the wrist or the torque at a joint is above the limit.
-    pub(crate) fn add(&mut self, time: f64, duration_secs: f64, wrench: &Wrench) -> bool {
+    /// `wrench` on the tool; `tool` where [`Self::reads_motion`]. Returns whether the force at the wrist or the torque at a joint is above the
+    /// limit.
+    pub(crate) fn add(&mut self, time: f64, duration_secs: f64, tool: Option<&ToolMoment>, wrench: &Wrench) -> bool {
         let moment = self.path.map(|path| path.moment(time, duration_secs));
-        self.read(moment.as_ref(), wrench)
+        self.read(moment.as_ref(), tool, wrench)
     }
 
     /// As [`Self::add`] for an arm that stands still after `share` of its path.
-    pub(crate) fn add_stopped(&mut self, share: f64, wrench: &Wrench) -> bool {
+    pub(crate) fn add_stopped(&mut self, share: f64, tool: Option<&ToolMoment>, wrench: &Wrench) -> bool {
         let moment = self.path.map(|path| path.stopped(share));
-        self.read(moment.as_ref(), wrench)
+        self.read(moment.as_ref(), tool, wrench)
     }
 
-    fn read(&mut self, moment: Option<&JointMoment>, wrench: &Wrench) -> bool {
+    /// As [`Self::add`] for an arm off its path.
+    pub(crate) fn add_moment(&mut self, joints: &JointMoment, tool: Option<&ToolMoment>, wrench: &Wrench) -> bool {
+        self.read(self.path.is_some().then_some(joints), tool, wrench)
+    }
+
+    fn read(&mut self, moment: Option<&JointMoment>, tool: Option<&ToolMoment>, wrench: &Wrench) -> bool {
         self.samples += 1;
+        // Without contact nothing is a collision, whatever the arm's own weight and motion take and its sensors make of it.
+        let touched = wrench.force_magnitude_n() > 0.0;
+        let mut read = *wrench;
+        if let (Some(chain), Some(tool)) = (&mut self.chain, tool) {
+            chain.apply(tool, &mut read);
+        }
         match moment {
             None => {
-                self.wrench.add_scaled(wrench, 1.0);
-                wrench.force_magnitude_n() > self.config.large_force_limit
+                self.wrench.add_scaled(&read, 1.0);
+                touched && read.force_magnitude_n() > self.config.large_force_limit
             }
             Some(moment) => {
-                let torques = joint_torques(self.robot, moment, wrench);
+                let torques = joint_torques(self.robot, self.effects, moment, &read);
                 for (sum, torque) in self.torques_nm.iter_mut().zip(torques) {
                     *sum += torque;
                 }
-                // Without contact nothing is a collision, whatever the arm's own weight and motion take.
-                wrench.force_magnitude_n() > 0.0
-                    && torques.iter().any(|torque| torque.abs() > self.config.large_force_limit)
+                touched && torques.iter().any(|torque| torque.abs() > self.config.large_force_limit)
             }
         }
     }
@@ -77,11 +106,18 @@ impl<'a> ForceSensor<'a> {
     }
 }
 
-/// What the sensors of an arm read that stands still without contact.
-pub(crate) fn resting_reading(robot: &Robot, config: &SensorConfig, joints_rad: &[f64]) -> [f64; 6] {
+/// What the sensors of an arm read that stands still without contact, as `tool` says.
+pub(crate) fn resting_reading(
+    robot: &Robot,
+    config: &SensorConfig,
+    effects: Effects,
+    joints_rad: &[f64],
+    tool: &ToolMoment,
+) -> [f64; 6] {
     let path = ForceSensor::needs_path(config).then(|| JointPath::resting(joints_rad));
-    let mut sensor = ForceSensor::new(robot, config, path);
-    sensor.add_stopped(0.0, &Wrench::default());
+    // A filter starts settled, whatever its period.
+    let mut sensor = ForceSensor::new(robot, config, effects, 1.0, path);
+    sensor.add_stopped(0.0, Some(tool), &Wrench::default());
     sensor.mean(joints_rad)
 }
 
@@ -97,10 +133,15 @@ fn wrist_reading(robot: &Robot, joints_rad: &[f64], wrench: &Wrench) -> [f64; 6]
     [force.x, force.y, force.z, torque.x, torque.y, torque.z]
 }
 
-/// Torques that the motors give, N·m: M(q) q̈ + C(q, q̇) q̇ + g(q) − Jᵀw; unused places are 0.
-fn joint_torques(robot: &Robot, moment: &JointMoment, wrench: &Wrench) -> [f64; 6] {
+/// Torques that the motors give, N·m: M(q) q̈ + C(q, q̇) q̇ + g(q) − Jᵀw, and what effects add; unused places are 0.
+fn joint_torques(robot: &Robot, effects: Effects, moment: &JointMoment, wrench: &Wrench) -> [f64; 6] {
     let q = moment.position_rad();
-    let motion = robot.inverse_dynamics(q, moment.rate_rps(), moment.acceleration_rps2());
+    let mut motion = robot.inverse_dynamics(q, moment.rate_rps(), moment.acceleration_rps2());
+    if effects.hooks.contains(Hooks::JOINT_FRICTION) {
+        for effect in effects.list {
+            effect.joint_friction(moment.rate_rps(), &mut motion);
+        }
+    }
     let mut torques = [0.0; 6];
     let [fx, fy, fz] = wrench.force_n;
     let [tx, ty, tz] = wrench.torque_nm;

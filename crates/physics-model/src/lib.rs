@@ -29,8 +29,10 @@
 
 pub mod action;
 mod arm;
+mod bodies;
 pub mod config;
 mod contact;
+mod drive;
 pub mod effect;
 pub mod effects;
 pub mod error;
@@ -39,6 +41,7 @@ mod force;
 mod friction;
 pub mod goal;
 pub mod heuristic;
+mod loads;
 pub mod model;
 mod model_error;
 mod motion;
@@ -48,13 +51,16 @@ pub mod reward;
 pub mod robot;
 pub mod sampling;
 pub mod sensor;
+mod simulation;
+mod spring;
 pub mod state;
 pub mod theta;
 pub mod world;
 
 pub use action::Action;
 pub use config::PushConfig;
-pub use error::Impossible;
+pub use effect::{EffectConfig, EffectKind};
+pub use error::{EffectError, Impossible};
 pub use goal::GoalPolicy;
 pub use heuristic::HeuristicPolicy;
 pub use model::{ActionReport, Particle, PushModel};

@@ -6,21 +6,23 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vect
 use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng, Step};
 use serde::{Deserialize, Serialize};
 
-use crate::action::{Action, minimum_jerk};
-use crate::config::{ArmConfig, ForceSensing, ObstacleMobility, PushConfig};
-use crate::effect::{Effect, EffectConfig};
+use crate::action::Action;
+use crate::config::{ArmConfig, ForceSensing, PushConfig};
+use crate::effect::{Effect, EffectConfig, Hooks, Memory, Nominal, ToolMoment, signal};
 use crate::error::Impossible;
-use crate::feasible::{check_overlaps, check_theta, nothing_happens, parts_in_reach};
+use crate::feasible::{check_overlaps, check_theta};
 use crate::force::{ForceSensor, resting_reading};
 use crate::model_error;
+use crate::loads::Effects;
 use crate::motion::JointPath;
 use crate::perturb;
 use crate::reward::Events;
 use crate::robot::Robot;
 use crate::sensor::{Observation, ObservationKey, Readings};
-use crate::state::{BodyState, State};
+use crate::simulation::{Course, Simulation};
+use crate::state::State;
 use crate::theta::Theta;
-use crate::world::{Divergence, ToolPose, World, Wrench};
+use crate::world::{Divergence, ToolPose};
 
 /// Attempts at moving a hypothesis to a possible one.
 const PERTURB_DRAWS: usize = 5;
@@ -37,13 +39,16 @@ pub struct Particle {
     pub object_moved: bool,
     /// Noise-free force readings of the last action (see [`Readings::force`]).
     pub force: [f64; 6],
+    /// What effects remember; only where one of them does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Box<Memory>>,
 }
 
 impl Particle {
     /// A hypothesis at the start of an episode.
     #[must_use]
     pub fn new(state: State, theta: Theta) -> Self {
-        Self { state, theta, object_moved: false, force: [0.0; 6] }
+        Self { state, theta, object_moved: false, force: [0.0; 6], memory: None }
     }
 }
 
@@ -60,24 +65,6 @@ pub struct ActionReport {
     pub divergence: Option<Divergence>,
 }
 
-/// Control steps between two looks at whether anything will still happen in an action.
-const QUIET_CHECK_STEPS: u32 = 4;
-
-/// Where the tool is to go in an action: in a straight line, in its fixed orientation.
-struct Course {
-    tool: ToolPose,
-    target_m: [f64; 3],
-}
-
-/// What an action left behind.
-struct End {
-    object: BodyState,
-    obstacle: Option<BodyState>,
-    tool_m: [f64; 3],
-    /// Where a dynamic arm ended, rad.
-    arm_joints_rad: Option<Vec<f64>>,
-}
-
 /// The simulator G(s, a | Θ) of the pushing task.
 #[derive(Clone, Debug)]
 pub struct PushModel {
@@ -85,8 +72,6 @@ pub struct PushModel {
     robot: Arc<Robot>,
     effects: Arc<Vec<Box<dyn Effect>>>,
     tool_orientation: UnitQuaternion<f64>,
-    /// No effect turns gravity: what rests goes on resting.
-    level: bool,
 }
 
 impl PushModel {
@@ -94,15 +79,10 @@ impl PushModel {
     #[must_use]
     pub fn new(config: PushConfig, robot: Arc<Robot>) -> Self {
         let effects: Arc<Vec<Box<dyn Effect>>> = Arc::new(config.effects.iter().map(EffectConfig::build).collect());
-        let down = [0.0, 0.0, -config.world.gravity_mps2];
-        let mut gravity = down;
-        for effect in effects.iter() {
-            effect.gravity(&mut gravity);
-        }
         let r = robot.tool_rotation();
         let rotation = Matrix3::from_fn(|row, column| r[row][column]);
         let tool_orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-        Self { config, robot, effects, tool_orientation, level: gravity == down }
+        Self { config, robot, effects, tool_orientation }
     }
 
     /// Configuration.
@@ -159,7 +139,14 @@ impl PushModel {
     /// What noise-free sensors would say in the state that `particle` is in.
     #[must_use]
     pub fn readings(&self, particle: &Particle) -> Readings {
-        Readings { joints_rad: particle.state.joints_rad.clone(), force: particle.force, object: particle.state.object }
+        let mut object = particle.state.object;
+        if let Some(memory) = &particle.memory {
+            memory.apply_lag(&mut object);
+        }
+        if self.effects_of(particle).hooks.contains(Hooks::POSE) {
+            object = signal::read(self.effects_of(particle).list, &object);
+        }
+        Readings { joints_rad: particle.state.joints_rad.clone(), force: particle.force, object }
     }
 
     /// The force readings that an observation holds (see [`Readings::force`]).
@@ -185,7 +172,16 @@ impl PushModel {
 
     /// Observation before the first action: no contact force yet.
     pub fn initial_observation(&self, particle: &mut Particle, rng: &mut Rng) -> Observation {
-        particle.force = resting_reading(&self.robot, &self.config.sensor, &particle.state.joints_rad);
+        let tool = self.tool_pose(&particle.state.joints_rad);
+        let moment = ToolMoment {
+            time_secs: 0.0,
+            orientation: tool.orientation,
+            acceleration_mps2: [0.0; 3],
+            gravity_mps2: self.config.world.gravity_mps2,
+        };
+        let effects = self.effects_of(particle);
+        let sensor = &self.config.sensor;
+        particle.force = resting_reading(&self.robot, sensor, effects, &particle.state.joints_rad, &moment);
         self.config.sensor.observe(&self.readings(particle), rng)
     }
 
@@ -203,9 +199,13 @@ impl PushModel {
         report.events.out_of_reach = goal_joints.is_none();
 
         let course = Course { tool, target_m: if goal_joints.is_some() { target } else { start } };
-        let path = self.joint_path(&particle.state.joints_rad, goal_joints.as_deref(), start, target);
-        let mut sensor = self.force_sensor(path);
-        let end = self.simulate(particle, &course, path.as_ref(), &mut sensor, &mut report);
+        let effects = self.effects_of(particle);
+        let nominal = Nominal::with_effects(&self.config.world, &particle.theta, effects.list);
+        let period_secs = nominal.as_ref().map_or(&self.config.world, |nominal| &nominal.world).control_period_secs;
+        let path = self.joint_path(effects, &particle.state.joints_rad, goal_joints.as_deref(), start, target);
+        let mut sensor = ForceSensor::new(&self.robot, &self.config.sensor, effects, period_secs, path);
+        let simulation = Simulation::new(self, particle, effects, nominal.as_ref(), &course, path.as_ref());
+        let end = simulation.run(&mut sensor, &mut report);
 
         if report.divergence.is_some() {
             // The state stays as it was, so that nothing downstream meets a value that is not finite.
@@ -216,7 +216,7 @@ impl PushModel {
         let before = particle.state.object.position_m;
         particle.state.object = end.object;
         particle.state.obstacle = end.obstacle;
-        if let Some(joints) = end.arm_joints_rad {
+        if let Some(joints) = end.joints_rad {
             particle.state.joints_rad = joints;
         } else if let Some(joints) = goal_joints {
             // A move that was stopped early ends on the way to its target.
@@ -227,6 +227,17 @@ impl PushModel {
             };
         }
         particle.force = sensor.mean(&particle.state.joints_rad);
+        if effects.hooks.contains(Hooks::MEMORY) {
+            let memory = particle.memory.get_or_insert_default();
+            memory.elapsed_secs += end.duration_secs;
+            memory.play_rad = end.play_rad.unwrap_or(memory.play_rad);
+            if let Some(hidden) = end.hidden {
+                memory.hidden = hidden;
+            }
+            if let Some(seen) = end.seen {
+                memory.note_lag(&seen, &particle.state.object);
+            }
+        }
         let after = particle.state.object.position_m;
         let moved = (0..3).map(|i| (after[i] - before[i]).powi(2)).sum::<f64>().sqrt();
         report.events.first_moved = !particle.object_moved && moved > task.reward.moved_threshold_m;
@@ -237,132 +248,7 @@ impl PushModel {
         (Step { observation, reward: task.reward.reward(report.events), outcome }, report)
     }
 
-    /// Moves the tool along its course. What is simulated lies between the control step in which the tool first comes near a body, or all
-    /// of them if a body does not rest, and the one after which everything rests and the tool stays clear.
-    fn simulate(
-        &self,
-        particle: &Particle,
-        course: &Course,
-        path: Option<&JointPath>,
-        sensor: &mut ForceSensor,
-        report: &mut ActionReport,
-    ) -> End {
-        let world_config = &self.config.world;
-        let steps = world_config.control_steps;
-        let duration_secs = world_config.control_period_secs * f64::from(steps);
-        let (start, target) = (course.tool.position_m, course.target_m);
-        let moves = start != target;
-        let (mut object, mut obstacle) = (particle.state.object, particle.state.obstacle);
-        let all_quiet = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &course.tool, target);
-        let shapes = self.robot.tool_shapes();
-        if !all_quiet
-            && check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &course.tool, shapes).is_err()
-        {
-            report.divergence = Some(Divergence::Overlaps);
-            return End { object, obstacle, tool_m: start, arm_joints_rad: None };
-        }
-        let mut world: Option<World> = None;
-        let mut ended = false;
-        // How many control steps of its path the tool has made, and whether it still goes on.
-        let (mut made, mut position, mut share, mut stopped) = (0, start, 0.0, !moves);
-        for step in 1..=steps {
-            let time = f64::from(step) / f64::from(steps);
-            let tool = ToolPose { position_m: position, ..course.tool };
-            if !stopped {
-                made = step;
-            }
-            share = if moves { minimum_jerk(f64::from(made) / f64::from(steps)) } else { share };
-            position = std::array::from_fn(|i| start[i] + share * (target[i] - start[i]));
-            let quiet = all_quiet
-                || ended
-                || (world.is_none() && self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, position));
-            let (wrench, against) = if quiet {
-                (Wrench::default(), false)
-            } else {
-                let world = world.get_or_insert_with(|| {
-                    let (theta, obstacle) = (&particle.theta, obstacle.as_ref());
-                    let shapes = parts_in_reach(world_config, theta, &object, obstacle, &tool, target, shapes);
-                    let world = World::restore(world_config, &self.effects, theta, &object, obstacle, &tool, &shapes);
-                    match &self.config.arm {
-                        ArmConfig::Kinematic => world,
-                        ArmConfig::Dynamic(servo) => {
-                            world.with_dynamic_arm(&self.robot, servo, &particle.state.joints_rad)
-                        }
-                    }
-                });
-                let wrench = match (&self.config.arm, path) {
-                    (ArmConfig::Dynamic(_), Some(path)) => world.step_arm(path.stopped(share).position_rad()),
-                    _ => world.step(position),
-                };
-                report.tool_touched |= wrench.force_magnitude_n() > 0.0;
-                report.obstacle_touched |= world.obstacle_touched();
-                let normal = world.normal_force_n();
-                (wrench, (0..3).map(|i| normal[i] * (target[i] - start[i])).sum::<f64>() < 0.0)
-            };
-            let large =
-                if stopped { sensor.add_stopped(share, &wrench) } else { sensor.add(time, duration_secs, &wrench) };
-            report.events.large_force |= large;
-            if large && against {
-                // The arm's collision reaction: it goes back along its path, step by step, to where the force is bearable, and stays there. A
-                // force that does not push against the move is left behind by it.
-                stopped = true;
-                made = made.saturating_sub(1);
-            }
-            if step % QUIET_CHECK_STEPS == 0
-                && !ended
-                && let Some(world) = &world
-            {
-                report.divergence = report.divergence.or_else(|| world.divergence());
-                let (object, obstacle) = (world.object(), world.obstacle());
-                let tool = ToolPose { position_m: position, ..course.tool };
-                let end = if stopped { position } else { target };
-                ended = self.is_quiet(&particle.theta, &object, obstacle.as_ref(), &tool, end);
-            }
-        }
-        let mut arm_joints_rad = None;
-        match &world {
-            None => {
-                for body in std::iter::once(&mut object).chain(&mut obstacle) {
-                    body.linear_mps = [0.0; 3];
-                    body.angular_rps = [0.0; 3];
-                }
-            }
-            Some(world) => {
-                object = world.object();
-                // What cannot move keeps its last digits, which the engine does not have.
-                if world_config.obstacle_mobility == ObstacleMobility::Movable {
-                    obstacle = world.obstacle();
-                }
-                arm_joints_rad = world.arm_joints_rad();
-                let tool = match &arm_joints_rad {
-                    Some(joints) => self.tool_pose(joints),
-                    None => ToolPose { position_m: position, ..course.tool },
-                };
-                report.divergence = report.divergence.or_else(|| world.divergence()).or_else(|| {
-                    check_overlaps(world_config, &particle.theta, &object, obstacle.as_ref(), &tool, shapes)
-                        .is_err()
-                        .then_some(Divergence::Overlaps)
-                });
-            }
-        }
-        End { object, obstacle, tool_m: position, arm_joints_rad }
-    }
-
-    fn is_quiet(
-        &self,
-        theta: &Theta,
-        object: &BodyState,
-        obstacle: Option<&BodyState>,
-        tool: &ToolPose,
-        target_m: [f64; 3],
-    ) -> bool {
-        let shapes = self.robot.tool_shapes();
-        // A dynamic arm does not follow its path exactly.
-        let exact = self.config.arm == ArmConfig::Kinematic;
-        exact && self.level && nothing_happens(&self.config.world, theta, object, obstacle, tool, target_m, shapes)
-    }
-
-    fn tool_pose(&self, joints_rad: &[f64]) -> ToolPose {
+    pub(crate) fn tool_pose(&self, joints_rad: &[f64]) -> ToolPose {
         let base_from_tool = self.robot.base_from_tool(joints_rad);
         let q = base_from_tool.rotation;
         ToolPose { position_m: base_from_tool.translation.vector.into(), orientation: [q.i, q.j, q.k, q.w] }
@@ -371,12 +257,13 @@ impl PushModel {
     /// The joints' way while the tool moves from `start_m` to `target_m`, or rests; `None` where neither the arm nor its sensor asks for it.
     fn joint_path(
         &self,
+        effects: Effects,
         start_rad: &[f64],
         end_rad: Option<&[f64]>,
         start_m: [f64; 3],
         target_m: [f64; 3],
     ) -> Option<JointPath> {
-        let dynamic = matches!(self.config.arm, ArmConfig::Dynamic(_));
+        let dynamic = matches!(self.config.arm, ArmConfig::Dynamic(_)) || effects.hooks.contains(Hooks::JOINT_COMMAND);
         (dynamic || ForceSensor::needs_path(&self.config.sensor)).then(|| match end_rad {
             None => JointPath::resting(start_rad),
             Some(end_rad) => {
@@ -390,9 +277,8 @@ impl PushModel {
         })
     }
 
-    fn force_sensor(&self, path: Option<JointPath>) -> ForceSensor<'_> {
-        let path = path.filter(|_| ForceSensor::needs_path(&self.config.sensor));
-        ForceSensor::new(&self.robot, &self.config.sensor, path)
+    fn effects_of(&self, _particle: &Particle) -> Effects<'_> {
+        Effects::new(&self.effects)
     }
 }
 

@@ -79,6 +79,18 @@ impl JointMoment {
         &self.position[..self.count]
     }
 
+    pub(crate) fn position_rad_mut(&mut self) -> &mut [f64] {
+        &mut self.position[..self.count]
+    }
+
+    /// Rates and accelerations of a motion that was at `before` a period ago.
+    pub(crate) fn follow(&mut self, before: &Self, period_secs: f64) {
+        for j in 0..self.count {
+            self.rate[j] = (self.position[j] - before.position[j]) / period_secs;
+            self.acceleration[j] = (self.rate[j] - before.rate[j]) / period_secs;
+        }
+    }
+
     pub(crate) fn rate_rps(&self) -> &[f64] {
         &self.rate[..self.count]
     }

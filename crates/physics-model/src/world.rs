@@ -7,20 +7,22 @@
 //! of the contacts, which hides the centre of mass, and recycled contacts change friction.
 
 use rapier3d::prelude::{
-    ActiveCollisionTypes, ActiveHooks, Ball, CoefficientCombineRule, ColliderBuilder, ColliderHandle, Cuboid, Cylinder,
-    FrictionModel, MassProperties, PhysicsWorld, Pose, RigidBodyBuilder, RigidBodyHandle, Rotation, SharedShape,
-    SpringCoefficients, Vector,
+    ColliderBuilder, ColliderHandle, FrictionModel, LockedAxes, PhysicsHooks, PhysicsWorld, Pose, RigidBodyBuilder,
+    RigidBodyHandle, Rotation, SharedShape, SpringCoefficients, Vector,
 };
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
+use crate::bodies::{Body, BodySpec, insert_body, material, separate_supports};
 use crate::config::{ObstacleMobility, ServoConfig, WorldConfig};
 use crate::contact::{lowest_point, table_wrench, tool_wrench, touches};
-use crate::effect::{BodyView, Effect, Load, Surroundings};
+use crate::effect::{BodyRole, Effect, Hooks, Memory, Nominal};
 use crate::friction::OpposeSlip;
+use crate::loads::{Effects, TableFriction};
 use crate::robot::{Robot, ToolShape};
+use crate::spring::ToolSpring;
 use crate::state::BodyState;
-use crate::theta::{ObjectShape, Theta};
+use crate::theta::Theta;
 
 /// Fastest body, m/s, that a push of 0.1 m/s can plausibly cause.
 const SPEED_LIMIT_MPS: f64 = 5.0;
@@ -61,16 +63,6 @@ impl Wrench {
     }
 }
 
-struct Body {
-    handle: RigidBodyHandle,
-    collider: ColliderHandle,
-    shape: ObjectShape,
-    mass_kg: f64,
-    half_height_m: f64,
-    radius_m: f64,
-    dynamic: bool,
-}
-
 /// What a simulation must not end in: no push of 0.1 m/s does this to rigid bodies, so that the hypothesis is not a world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -87,9 +79,10 @@ pub enum Divergence {
 
 /// A live world: table, tool, object and perhaps an obstacle.
 pub struct World<'a> {
-    config: &'a WorldConfig,
-    effects: &'a [Box<dyn Effect>],
+    config: WorldConfig,
+    effects: Effects<'a>,
     physics: PhysicsWorld,
+    table: ColliderHandle,
     tool: RigidBodyHandle,
     tool_colliders: Vec<ColliderHandle>,
     /// Lowest point of the tool from its centre, m, base axes.
@@ -97,7 +90,12 @@ pub struct World<'a> {
     normal_n: [f64; 3],
     object: Body,
     obstacle: Option<Body>,
+    /// Bodies that only effects know of.
+    hidden: Vec<Body>,
     arm: Option<Arm<'a>>,
+    spring: Option<ToolSpring>,
+    /// Since the episode began.
+    time_secs: f64,
 }
 
 impl<'a> World<'a> {
@@ -113,48 +111,21 @@ impl<'a> World<'a> {
         tool: &ToolPose,
         tool_shapes: &[ToolShape],
     ) -> Self {
-        let mut physics = PhysicsWorld::new();
-        let mut gravity = [0.0, 0.0, -config.gravity_mps2];
-        for effect in effects {
-            effect.gravity(&mut gravity);
-        }
-        physics.gravity = vector(gravity);
-        let parameters = &mut physics.integration_parameters;
-        parameters.dt = config.control_period_secs as f32;
-        parameters.num_solver_iterations = config.solver_iterations as usize;
-        parameters.friction_model = FrictionModel::Coulomb;
-        parameters.contact_recycling = false;
-        parameters.contact_clustering = false;
-        parameters.max_ccd_substeps = 0;
-        // The size of the things that are pushed: with rapier's metre, pairs are looked into from 8 cm apart, at a quarter more time.
-        parameters.length_unit = 0.1;
-        parameters.normalized_max_corrective_velocity *= 10.0;
-        let softness = SpringCoefficients {
-            natural_frequency: config.contact_frequency_hz as f32,
-            damping_ratio: config.contact_damping_ratio as f32,
-        };
-        parameters.contact_softness = softness;
-        parameters.static_contact_softness = softness;
-
-        physics.insert(
+        let changed = Nominal::with_effects(config, theta, effects);
+        let (config, theta) = changed.as_ref().map_or((config, theta), |nominal| (&nominal.world, &nominal.theta));
+        let support_share = changed.as_ref().and_then(|nominal| nominal.support_share);
+        let mut physics = engine(config, effects);
+        let (_, table) = physics.insert(
             RigidBodyBuilder::fixed().translation(vector([0.0, 0.0, config.table_height_m])),
             material(ColliderBuilder::new(SharedShape::halfspace(Vector::Z)), 1.0, config),
         );
-        let object_body = insert_body(&mut physics, config, true, &BodySpec::object(theta), object);
-        let obstacle_body = match (&theta.obstacle, obstacle) {
-            (Some(parameters), Some(state)) => {
-                let spec = BodySpec {
-                    shape: parameters.shape,
-                    size_m: parameters.size_m,
-                    mass_kg: parameters.mass_kg,
-                    com_m: [0.0; 3],
-                    friction: config.obstacle_friction,
-                };
-                let movable = config.obstacle_mobility == ObstacleMobility::Movable;
-                Some(insert_body(&mut physics, config, movable, &spec, state))
-            }
-            _ => None,
-        };
+        let spec = BodySpec::object(theta, support_share);
+        let object = insert_body(&mut physics, config, BodyRole::Object, true, spec, object);
+        let obstacle = theta.obstacle.as_ref().zip(obstacle).map(|(parameters, state)| {
+            let movable = config.obstacle_mobility == ObstacleMobility::Movable;
+            let spec = BodySpec::obstacle(parameters, config);
+            insert_body(&mut physics, config, BodyRole::Obstacle, movable, spec, state)
+        });
         let tool_body = physics
             .insert_body(RigidBodyBuilder::kinematic_position_based().pose(pose(tool.position_m, tool.orientation)));
         let tool_colliders = tool_shapes
@@ -171,18 +142,64 @@ impl<'a> World<'a> {
                 physics.insert_collider(material(builder, config.tool_friction, config), Some(tool_body))
             })
             .collect();
-        Self {
-            config,
-            effects,
+        let mut world = Self {
+            config: config.clone(),
+            effects: Effects::new(effects),
             physics,
+            table,
             tool: tool_body,
             tool_colliders,
             tool_lowest: lowest_point(tool, tool_shapes),
             normal_n: [0.0; 3],
-            object: object_body,
-            obstacle: obstacle_body,
+            object,
+            obstacle,
+            hidden: Vec::new(),
             arm: None,
+            spring: None,
+            time_secs: 0.0,
+        };
+        if let Some(nominal) = &changed {
+            world.complete(nominal);
         }
+        world
+    }
+
+    /// Adds what only effects ask for.
+    fn complete(&mut self, nominal: &Nominal) {
+        for body in &nominal.hidden {
+            let [x, y] = body.place_m;
+            let z = self.config.table_height_m + body.shape.half_height_m(body.size_m);
+            let state = BodyState::at_rest([x, y, z], body.yaw_rad);
+            let spec = BodySpec::hidden(body, &self.config);
+            let body = insert_body(&mut self.physics, &self.config, BodyRole::Hidden, body.movable, spec, &state);
+            self.hidden.push(body);
+        }
+        if nominal.support_share.is_some() {
+            separate_supports(&mut self.physics, self.table);
+        }
+        if nominal.tool_stiffness_npm.is_finite() {
+            let period_secs = self.config.control_period_secs;
+            self.spring = Some(ToolSpring::new(&mut self.physics, self.tool, nominal.tool_stiffness_npm, period_secs));
+        }
+    }
+
+    /// The same world later in an episode, with what its effects remember. Only for a world that has not made a step.
+    #[must_use]
+    pub fn with_memory(mut self, memory: &Memory) -> Self {
+        self.time_secs = memory.elapsed_secs;
+        for (body, state) in self.hidden.iter().zip(&memory.hidden) {
+            let rigid = &mut self.physics.bodies[body.handle];
+            rigid.set_position(pose(state.position_m, state.orientation), true);
+            rigid.set_linvel(vector(state.linear_mps), true);
+            rigid.set_angvel(vector(state.angular_rps), true);
+        }
+        self
+    }
+
+    /// States of the bodies that only effects know of, in the order of the effects.
+    #[must_use]
+    pub fn hidden(&self) -> Vec<BodyState> {
+        self.hidden.iter().map(|body| self.body_state(body)).collect()
     }
 
     /// The same world with the tool on a dynamic arm, at rest at `joints_rad`, which must be those of the tool's pose. Only for a
@@ -193,20 +210,35 @@ impl<'a> World<'a> {
     /// If `joints_rad` has not one value per joint.
     #[must_use]
     pub fn with_dynamic_arm(mut self, robot: &'a Robot, servo: &ServoConfig, joints_rad: &[f64]) -> Self {
+        if self.spring.take().is_some() {
+            // An arm of links has the stiffness of its servos.
+            self.physics.bodies[self.tool].set_locked_axes(LockedAxes::empty(), true);
+        }
         self.arm = Some(Arm::new(&mut self.physics, self.tool, robot, servo, joints_rad));
         self
     }
 
-    /// Advances one control step, at whose end the tool is at `position_m` (base frame); its orientation stays.
-    /// Returns the mean wrench on the tool during the step.
+    /// Advances one control step, at whose end the tool is commanded to be at `position_m` (base frame); its orientation stays. Unless an
+    /// effect lets the tool give way, that is where it is. Returns the mean wrench on the tool during the step.
     pub fn step(&mut self, position_m: [f64; 3]) -> Wrench {
-        self.apply_effects();
-        self.physics.bodies[self.tool].set_next_kinematic_translation(vector(position_m));
-        self.physics.step_with_events(&OpposeSlip, &());
-        let mut wrench = self.tool_wrench(position_m, self.config.arm_stiffness_npm);
-        let table = table_wrench(self.config, position_m, self.tool_lowest);
-        wrench.add_scaled(&table, 1.0);
-        self.normal_n[2] += table.force_n[2];
+        let attraction = self.apply_effects(|world| match &mut world.spring {
+            None => world.physics.bodies[world.tool].set_next_kinematic_translation(vector(position_m)),
+            Some(spring) => spring.command(&mut world.physics, world.tool, position_m),
+        });
+        self.advance();
+        let mut wrench = match self.spring {
+            None => {
+                let mut wrench = self.tool_wrench(position_m, self.config.arm_stiffness_npm);
+                let table = table_wrench(&self.config, position_m, self.tool_lowest);
+                wrench.add_scaled(&table, 1.0);
+                self.normal_n[2] += table.force_n[2];
+                wrench
+            }
+            Some(_) => self.tool_wrench(self.tool_position_m(), 0.0),
+        };
+        if let Some(attraction) = attraction {
+            wrench.add_scaled(&attraction, 1.0);
+        }
         wrench
     }
 
@@ -223,12 +255,25 @@ impl<'a> World<'a> {
     ///
     /// In a world without a dynamic arm.
     pub fn step_arm(&mut self, joints_rad: &[f64]) -> Wrench {
-        self.apply_effects();
-        let arm = self.arm.as_mut().expect("a world with a dynamic arm");
-        arm.command(&mut self.physics, joints_rad);
-        self.physics.step_with_events(&OpposeSlip, &());
+        let attraction = self.apply_effects(|world| {
+            let arm = world.arm.as_mut().expect("a world with a dynamic arm");
+            arm.command(&mut world.physics, world.effects, joints_rad);
+        });
+        self.advance();
         // This arm's stiffness is that of its servos.
-        self.tool_wrench(self.tool_position_m(), 0.0)
+        let mut wrench = self.tool_wrench(self.tool_position_m(), 0.0);
+        if let Some(attraction) = attraction {
+            wrench.add_scaled(&attraction, 1.0);
+        }
+        wrench
+    }
+
+    fn advance(&mut self) {
+        let friction = TableFriction { effects: self.effects, table: self.table };
+        let changed = self.effects.hooks.contains(Hooks::FRICTION);
+        let hooks: &dyn PhysicsHooks = if changed { &friction } else { &OpposeSlip };
+        self.physics.step_with_events(hooks, &());
+        self.time_secs += self.config.control_period_secs;
     }
 
     fn tool_wrench(&mut self, center_m: [f64; 3], stiffness_npm: f64) -> Wrench {
@@ -252,6 +297,12 @@ impl<'a> World<'a> {
         array(self.physics.bodies[self.tool].translation())
     }
 
+    /// Whether the tool is not simply where it is commanded to be.
+    #[must_use]
+    pub fn tool_gives_way(&self) -> bool {
+        self.spring.is_some() || self.arm.is_some()
+    }
+
     /// State of the object.
     #[must_use]
     pub fn object(&self) -> BodyState {
@@ -271,7 +322,7 @@ impl<'a> World<'a> {
         if self.arm_joints_rad().is_some_and(|joints| joints.iter().any(|v| !v.is_finite())) {
             return Some(Divergence::NotFinite);
         }
-        for body in std::iter::once(&self.object).chain(&self.obstacle) {
+        for body in std::iter::once(&self.object).chain(&self.obstacle).chain(&self.hidden) {
             let state = self.body_state(body);
             if !state.to_array().iter().all(|v| v.is_finite()) {
                 return Some(Divergence::NotFinite);
@@ -296,34 +347,22 @@ impl<'a> World<'a> {
         })
     }
 
-    fn apply_effects(&mut self) {
-        if self.effects.is_empty() {
-            return;
-        }
-        let surroundings =
-            Surroundings { gravity_mps2: self.config.gravity_mps2, period_secs: self.config.control_period_secs };
-        for body in std::iter::once(&self.object).chain(&self.obstacle) {
-            if !body.dynamic {
-                continue;
+    /// Sets the loads of the coming control step and gives the command; the attraction on the tool, if an effect has one.
+    fn apply_effects(&mut self, command: impl FnOnce(&mut Self)) -> Option<Wrench> {
+        let hooks = self.effects.hooks;
+        if hooks.contains(Hooks::LOAD.and(Hooks::MASS)) {
+            for body in std::iter::once(&self.object).chain(&self.obstacle).chain(&self.hidden) {
+                self.effects.apply(&mut self.physics, &self.config, body, self.time_secs);
             }
-            let rigid = &mut self.physics.bodies[body.handle];
-            let height = f64::from(rigid.translation().z) - self.config.table_height_m;
-            let view = BodyView {
-                mass_kg: body.mass_kg,
-                rolling_radius_m: (body.shape == ObjectShape::Sphere).then_some(body.radius_m),
-                on_table: height < body.half_height_m + 0.002,
-                linear_mps: array(rigid.linvel()),
-                angular_rps: array(rigid.angvel()),
-            };
-            let mut load = Load::default();
-            for effect in self.effects {
-                effect.load(&surroundings, &view, &mut load);
-            }
-            rigid.reset_forces(false);
-            rigid.reset_torques(false);
-            rigid.add_force(vector(load.force_n), true);
-            rigid.add_torque(vector(load.torque_nm), true);
         }
+        command(self);
+        if !hooks.contains(Hooks::ATTRACTION) {
+            return None;
+        }
+        if self.arm.is_some() {
+            self.physics.bodies[self.tool].reset_forces(false);
+        }
+        Some(self.effects.attract(&mut self.physics, &self.object, self.tool, &self.tool_colliders))
     }
 
     fn body_state(&self, body: &Body) -> BodyState {
@@ -341,101 +380,31 @@ impl<'a> World<'a> {
     }
 }
 
-struct BodySpec {
-    shape: ObjectShape,
-    size_m: [f64; 3],
-    mass_kg: f64,
-    com_m: [f64; 3],
-    friction: f64,
-}
-
-impl BodySpec {
-    fn object(theta: &Theta) -> Self {
-        let o = &theta.object;
-        Self { shape: o.shape, size_m: o.size_m, mass_kg: o.mass_kg, com_m: o.com_m, friction: o.friction }
+/// The engine of a world, still empty.
+fn engine(config: &WorldConfig, effects: &[Box<dyn Effect>]) -> PhysicsWorld {
+    let mut physics = PhysicsWorld::new();
+    let mut gravity = [0.0, 0.0, -config.gravity_mps2];
+    for effect in effects {
+        effect.gravity(&mut gravity);
     }
-
-    /// Principal inertia, kg m², of a uniform solid about its centre, body axes.
-    fn inertia_kgm2(&self) -> [f64; 3] {
-        let m = self.mass_kg;
-        let [a, b, c] = self.size_m;
-        match self.shape {
-            ObjectShape::Box => [b * b + c * c, a * a + c * c, a * a + b * b].map(|v| m * v / 12.0),
-            ObjectShape::Cylinder => {
-                let across = m * (3.0 * a * a + b * b) / 12.0;
-                [across, across, m * a * a / 2.0]
-            }
-            ObjectShape::Sphere => [0.4 * m * a * a; 3],
-        }
-    }
-}
-
-fn insert_body(
-    physics: &mut PhysicsWorld,
-    config: &WorldConfig,
-    movable: bool,
-    spec: &BodySpec,
-    state: &BodyState,
-) -> Body {
-    let pose = pose(state.position_m, state.orientation);
-    let mut builder = if movable {
-        let angular = vector(state.angular_rps);
-        let arm = pose.transform_vector(vector(spec.com_m));
-        RigidBodyBuilder::dynamic()
-            .linvel(vector(state.linear_mps) + angular.cross(arm))
-            .angvel(angular)
-            .can_sleep(false)
-    } else {
-        RigidBodyBuilder::fixed()
+    physics.gravity = vector(gravity);
+    let parameters = &mut physics.integration_parameters;
+    parameters.dt = config.control_period_secs as f32;
+    parameters.num_solver_iterations = config.solver_iterations as usize;
+    parameters.friction_model = FrictionModel::Coulomb;
+    parameters.contact_recycling = false;
+    parameters.contact_clustering = false;
+    parameters.max_ccd_substeps = 0;
+    // The size of the things that are pushed: with rapier's metre, pairs are looked into from 8 cm apart, at a quarter more time.
+    parameters.length_unit = 0.1;
+    parameters.normalized_max_corrective_velocity *= 10.0;
+    let softness = SpringCoefficients {
+        natural_frequency: config.contact_frequency_hz as f32,
+        damping_ratio: config.contact_damping_ratio as f32,
     };
-    builder = builder.pose(pose).additional_mass_properties(MassProperties::new(
-        vector(spec.com_m),
-        spec.mass_kg as f32,
-        vector(spec.inertia_kgm2()),
-    ));
-    let mut collider =
-        ColliderBuilder::new(shared_shape(spec.shape, spec.size_m)).rotation(shape_axis_angle(spec.shape)).density(0.0);
-    if !movable {
-        // A kinematic tool and a fixed body do not move each other, but the arm feels it (see `contact`).
-        collider =
-            collider.active_collision_types(ActiveCollisionTypes::default() | ActiveCollisionTypes::KINEMATIC_FIXED);
-    }
-    let (handle, collider) = physics.insert(builder, material(collider, spec.friction, config));
-    Body {
-        handle,
-        collider,
-        shape: spec.shape,
-        mass_kg: spec.mass_kg,
-        half_height_m: spec.shape.half_height_m(spec.size_m),
-        radius_m: spec.size_m[0],
-        dynamic: movable,
-    }
-}
-
-fn material(builder: ColliderBuilder, friction: f64, config: &WorldConfig) -> ColliderBuilder {
-    builder
-        .friction(friction as f32)
-        .active_hooks(ActiveHooks::MODIFY_SOLVER_CONTACTS)
-        .friction_combine_rule(CoefficientCombineRule::Min)
-        .restitution(config.restitution as f32)
-        .restitution_combine_rule(CoefficientCombineRule::Max)
-}
-
-pub(crate) fn shared_shape(shape: ObjectShape, size_m: [f64; 3]) -> SharedShape {
-    let [a, b, c] = size_m.map(|v| v as f32);
-    match shape {
-        ObjectShape::Box => SharedShape::new(Cuboid::new(Vector::new(a, b, c) / 2.0)),
-        ObjectShape::Cylinder => SharedShape::new(Cylinder::new(b / 2.0, a)),
-        ObjectShape::Sphere => SharedShape::new(Ball::new(a)),
-    }
-}
-
-/// parry's cylinders stand along y, ours along z.
-pub(crate) fn shape_axis_angle(shape: ObjectShape) -> Vector {
-    match shape {
-        ObjectShape::Cylinder => Vector::new(std::f32::consts::FRAC_PI_2, 0.0, 0.0),
-        ObjectShape::Box | ObjectShape::Sphere => Vector::ZERO,
-    }
+    parameters.contact_softness = softness;
+    parameters.static_contact_softness = softness;
+    physics
 }
 
 pub(crate) fn vector(v: [f64; 3]) -> Vector {

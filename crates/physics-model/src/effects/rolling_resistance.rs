@@ -1,12 +1,19 @@
 //! Rolling resistance: rapier's rigid bodies have none, so without it a sphere would roll for ever.
+//!
+//! τ = c_rr N against the rolling part of the angular velocity, with N = m g of a body on the table.
+//!
+//! | symbol | key | unit | plausible | source |
+//! |---|---|---|---|---|
+//! | c_rr | `lever_m` | m | 0.0001 to 0.005 | engineering judgement; steel on steel below, wood on felt above |
+//!
+//! Acts as a torque (F) on spheres on the table. A sphere rolling without slip slows down by 5/7 c_rr g / r.
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::{BodyView, Effect, Load, Surroundings};
+use crate::effect::parameter::{Neutral, Parameter, parametric};
+use crate::effect::{BodyView, Effect, Hooks, Load, Surroundings};
 
-/// Torque c_rr N against the rolling part of the angular velocity of spheres on the table. Plausible: 0.1 to 5 mm.
-///
-/// A sphere rolling without slip slows down by 5/7 c_rr g / r.
+/// Torque c_rr N against the rolling of spheres; see the module of the same name for ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RollingResistance {
@@ -14,7 +21,15 @@ pub struct RollingResistance {
     pub lever_m: f64,
 }
 
+parametric!(RollingResistance, "rolling_resistance", {
+    lever_m: Parameter::new("m", [0.0001, 0.005], [0.0, 0.1], Neutral::Value(0.0)),
+});
+
 impl Effect for RollingResistance {
+    fn hooks(&self) -> Hooks {
+        Hooks::LOAD
+    }
+
     fn load(&self, surroundings: &Surroundings, body: &BodyView, load: &mut Load) {
         let Some(radius_m) = body.rolling_radius_m else { return };
         if !body.on_table {
@@ -38,7 +53,7 @@ mod tests {
     use super::*;
 
     fn torque(angular_rps: [f64; 3], on_table: bool) -> [f64; 3] {
-        let body = BodyView { mass_kg: 0.5, rolling_radius_m: Some(0.04), on_table, linear_mps: [0.0; 3], angular_rps };
+        let body = BodyView { rolling_radius_m: Some(0.04), on_table, angular_rps, ..BodyView::on_table(0.5) };
         let mut load = Load::default();
         let surroundings = Surroundings { gravity_mps2: 10.0, period_secs: 1.0 / 60.0 };
         RollingResistance { lever_m: 0.002 }.load(&surroundings, &body, &mut load);

@@ -1,10 +1,19 @@
 //! A table that is not level.
+//!
+//! g = g (sin s_x, sin s_y, −√(1 − sin² s_x − sin² s_y)).
+//!
+//! | symbol | key | unit | plausible | source |
+//! |---|---|---|---|---|
+//! | s_x, s_y | `slope_x_rad`, `slope_y_rad` | rad | up to 0.052 (3°) either way | engineering judgement |
+//!
+//! Acts as the direction of gravity (N): on every body in proportion to its mass.
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::Effect;
+use crate::effect::parameter::{Neutral, Parameter, parametric};
+use crate::effect::{Effect, Hooks};
 
-/// Gravity g (s_x, s_y) along the table. Plausible: up to 3°.
+/// Gravity g (s_x, s_y) along the table; see the module of the same name for ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableTilt {
@@ -14,7 +23,16 @@ pub struct TableTilt {
     pub slope_y_rad: f64,
 }
 
+parametric!(TableTilt, "table_tilt", {
+    slope_x_rad: Parameter::new("rad", [-0.0524, 0.0524], [-0.7, 0.7], Neutral::Value(0.0)),
+    slope_y_rad: Parameter::new("rad", [-0.0524, 0.0524], [-0.7, 0.7], Neutral::Value(0.0)),
+});
+
 impl Effect for TableTilt {
+    fn hooks(&self) -> Hooks {
+        Hooks::GRAVITY.and(Hooks::UNREST.when(self.slope_x_rad != 0.0 || self.slope_y_rad != 0.0))
+    }
+
     fn gravity(&self, gravity_mps2: &mut [f64; 3]) {
         let g = gravity_mps2.iter().map(|v| v * v).sum::<f64>().sqrt();
         let (sx, sy) = (self.slope_x_rad.sin(), self.slope_y_rad.sin());

@@ -1,10 +1,17 @@
-//! Viscous damping of translation.
+//! Viscous damping of translation: F = −c v.
+//!
+//! | symbol | key | unit | plausible | source |
+//! |---|---|---|---|---|
+//! | c | `coefficient_nspm` | N·s/m | 0.1 to 2 | engineering judgement: a film of oil, a brush |
+//!
+//! Acts as a force (F) at the centre of mass of every free body. Alone it lets the speed decay as v₀ exp(−c t / m).
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::{BodyView, Effect, Load, Surroundings};
+use crate::effect::parameter::{Neutral, Parameter, parametric};
+use crate::effect::{BodyView, Effect, Hooks, Load, Surroundings};
 
-/// F = −c v on every free body. Plausible: 0.1 to 2 N·s/m.
+/// F = −c v on every free body; see the module of the same name for ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ViscousDamping {
@@ -12,7 +19,15 @@ pub struct ViscousDamping {
     pub coefficient_nspm: f64,
 }
 
+parametric!(ViscousDamping, "viscous_damping", {
+    coefficient_nspm: Parameter::new("N·s/m", [0.1, 2.0], [0.0, 1000.0], Neutral::Value(0.0)),
+});
+
 impl Effect for ViscousDamping {
+    fn hooks(&self) -> Hooks {
+        Hooks::LOAD
+    }
+
     fn load(&self, surroundings: &Surroundings, body: &BodyView, load: &mut Load) {
         // An explicit force must not turn the velocity round within one step: c dt ≤ m.
         let c = self.coefficient_nspm.min(body.mass_kg / surroundings.period_secs);
@@ -32,13 +47,7 @@ mod tests {
         let surroundings = Surroundings { gravity_mps2: 9.81, period_secs: 1e-4 };
         let mut v = 1.0;
         for _ in 0..10_000 {
-            let body = BodyView {
-                mass_kg: 2.0,
-                rolling_radius_m: None,
-                on_table: true,
-                linear_mps: [v, 0.0, 0.0],
-                angular_rps: [0.0; 3],
-            };
+            let body = BodyView { linear_mps: [v, 0.0, 0.0], ..BodyView::on_table(2.0) };
             let mut load = Load::default();
             effect.load(&surroundings, &body, &mut load);
             v += load.force_n[0] / body.mass_kg * surroundings.period_secs;

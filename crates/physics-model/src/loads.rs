@@ -1,0 +1,144 @@
+//! What effects do to a live world in each control step: loads on bodies, mass, friction of contacts, attraction of the tool.
+
+use rapier3d::parry::query;
+use rapier3d::prelude::{
+    ColliderHandle, ColliderSet, ContactModificationContext, PhysicsHooks, PhysicsWorld, RigidBodyHandle, Vector,
+};
+
+use crate::bodies::Body;
+use crate::config::WorldConfig;
+use crate::effect::{BodyView, Effect, Hooks, Load, Surroundings, TableContact};
+use crate::friction::OpposeSlip;
+use crate::theta::ObjectShape;
+use crate::world::{Wrench, array, vector};
+
+/// Height over the resting height, m, up to which a body is on the table.
+const ON_TABLE_M: f64 = 0.002;
+/// Distance, m, up to which the engine is asked for the gap between tool and object.
+const GAP_LIMIT_M: f32 = 0.002;
+
+/// The effects of a world and what they change.
+#[derive(Clone, Copy)]
+pub(crate) struct Effects<'a> {
+    pub(crate) list: &'a [Box<dyn Effect>],
+    pub(crate) hooks: Hooks,
+}
+
+impl<'a> Effects<'a> {
+    pub(crate) fn new(list: &'a [Box<dyn Effect>]) -> Self {
+        Self { list, hooks: Hooks::of(list) }
+    }
+
+    /// Mass and loads of a body during the coming control step.
+    pub(crate) fn apply(self, physics: &mut PhysicsWorld, config: &WorldConfig, body: &Body, time_secs: f64) {
+        if !body.dynamic {
+            return;
+        }
+        let rigid = &mut physics.bodies[body.handle];
+        let mut share = 1.0;
+        if self.hooks.contains(Hooks::MASS) && body.role == crate::effect::BodyRole::Object {
+            share = self.list.iter().map(|effect| effect.mass_share(time_secs)).product();
+            body.spec.set_mass_share(rigid, share);
+        }
+        if !self.hooks.contains(Hooks::LOAD) {
+            return;
+        }
+        let surroundings = Surroundings { gravity_mps2: config.gravity_mps2, period_secs: config.control_period_secs };
+        let height = f64::from(rigid.translation().z) - config.table_height_m;
+        let view = BodyView {
+            role: body.role,
+            mass_kg: body.spec.mass_kg * share,
+            friction: body.spec.friction,
+            rolling_radius_m: (body.spec.shape == ObjectShape::Sphere).then_some(body.spec.size_m[0]),
+            on_table: height < body.half_height_m + ON_TABLE_M,
+            position_m: array(rigid.translation()),
+            linear_mps: array(rigid.linvel()),
+            angular_rps: array(rigid.angvel()),
+        };
+        let mut load = Load::default();
+        for effect in self.list {
+            effect.load(&surroundings, &view, &mut load);
+        }
+        rigid.reset_forces(false);
+        rigid.reset_torques(false);
+        rigid.add_force(vector(load.force_n), true);
+        rigid.add_torque(vector(load.torque_nm), true);
+    }
+
+    /// Pulls the object and the tool at their nearest points together; the wrench on the tool about its centre. After [`Self::apply`].
+    pub(crate) fn attract(
+        self,
+        physics: &mut PhysicsWorld,
+        object: &Body,
+        tool: RigidBodyHandle,
+        tool_colliders: &[ColliderHandle],
+    ) -> Wrench {
+        let Some((gap_m, at_tool, at_object, towards_object)) = nearest(&physics.colliders, tool_colliders, object)
+        else {
+            return Wrench::default();
+        };
+        let size: f64 = self.list.iter().map(|effect| effect.attraction(f64::from(gap_m))).sum();
+        let on_tool = towards_object * size as f32;
+        let loaded = self.hooks.contains(Hooks::LOAD);
+        let rigid = &mut physics.bodies[object.handle];
+        if !loaded {
+            rigid.reset_forces(false);
+            rigid.reset_torques(false);
+        }
+        rigid.add_force_at_point(-on_tool, at_object, true);
+        let rigid = &mut physics.bodies[tool];
+        let arm = at_tool - rigid.translation();
+        if rigid.is_dynamic() {
+            rigid.add_force(on_tool, true);
+        }
+        Wrench { force_n: array(on_tool), torque_nm: array(arm.cross(on_tool)) }
+    }
+}
+
+/// Gap, m, between tool and object, the nearest points of both, and the direction from the tool to the object.
+fn nearest(
+    colliders: &ColliderSet,
+    tool_colliders: &[ColliderHandle],
+    object: &Body,
+) -> Option<(f32, Vector, Vector, Vector)> {
+    let other = &colliders[object.collider];
+    let contacts = tool_colliders.iter().filter_map(|handle| {
+        let part = &colliders[*handle];
+        query::contact(part.position(), part.shape(), other.position(), other.shape(), GAP_LIMIT_M).ok().flatten()
+    });
+    let contact = contacts.min_by(|a, b| a.dist.total_cmp(&b.dist))?;
+    Some((contact.dist, contact.point1, contact.point2, contact.normal1))
+}
+
+/// Hook of a world whose effects change the friction with the table.
+pub(crate) struct TableFriction<'a> {
+    pub(crate) effects: Effects<'a>,
+    pub(crate) table: ColliderHandle,
+}
+
+impl PhysicsHooks for TableFriction<'_> {
+    fn modify_solver_contacts(&self, context: &mut ContactModificationContext) {
+        let body = match self.table {
+            table if table == context.collider1 => context.rigid_body2,
+            table if table == context.collider2 => context.rigid_body1,
+            _ => None,
+        };
+        let body = body.and_then(|handle| context.bodies.get(handle)).filter(|body| body.is_dynamic());
+        if let Some(body) = body
+            && let Some(manifold) = context.rigid_mut()
+            && !manifold.solver_contacts.is_empty()
+        {
+            let normal = *manifold.normal;
+            let factor = |point: Vector| {
+                let velocity = body.velocity_at_point(point);
+                let slip = velocity - normal * velocity.dot(normal);
+                let contact = TableContact { position_m: array(point), slip_mps: array(slip) };
+                self.effects.list.iter().map(|effect| effect.friction(&contact)).product::<f64>()
+            };
+            // The engine has one coefficient for all points of two shapes.
+            let sum: f64 = manifold.solver_contacts.iter().map(|c| factor((c.anchor1 + c.anchor2) * 0.5)).sum();
+            *manifold.friction *= (sum / manifold.solver_contacts.len() as f64) as f32;
+        }
+        OpposeSlip.modify_solver_contacts(context);
+    }
+}
