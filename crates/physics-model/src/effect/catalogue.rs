@@ -84,8 +84,24 @@ macro_rules! catalogue {
 // The order is that of the catalogue; along one signal (command, force, pose) it is also that of the physical parts.
 catalogue! {
     ViscousDamping: "F = −c v.",
+    QuadraticDrag: "F = −k |v| v.",
+    FrictionLevel: "Another friction coefficient of object and table.",
+    StribeckFriction: "More friction in slow slip.",
+    StaticFriction: "More friction before the slip.",
+    AnisotropicFriction: "Friction that depends on the direction of the slip.",
+    FrictionPatch: "Other friction at a place of the table.",
+    PressureDistribution: "The object bears on points nearer to its centre.",
     RollingResistance: "Torque c_rr N against rolling.",
     TableTilt: "The table is not level.",
+    ConstantForce: "A force on the object.",
+    Tether: "A spring from the object to a point.",
+    ComOffset: "The centre of mass is elsewhere.",
+    MassLeak: "The object loses mass.",
+    Restitution: "Bodies bounce.",
+    ContactCompliance: "Another stiffness and damping of contacts.",
+    ArmCompliance: "The tool gives way to forces.",
+    HiddenObstacle: "A body that Θ knows nothing of.",
+    Adhesion: "Tool and object stick together.",
 }
 
 impl EffectKind {
@@ -110,7 +126,10 @@ impl EffectKind {
     /// The effect once for every choice of what is not continuous, each with the values of [`Self::start`].
     #[must_use]
     pub fn variants(self) -> Vec<EffectConfig> {
-        vec![self.start()]
+        match self {
+            Self::HiddenObstacle => HiddenObstacle::choices().into_iter().map(EffectConfig::HiddenObstacle).collect(),
+            kind => vec![kind.start()],
+        }
     }
 }
 

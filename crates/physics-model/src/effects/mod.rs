@@ -2,10 +2,95 @@
 //!
 //! Ranges without a source are engineering judgement. Letters say where an effect acts, as in [`crate::effect`].
 
+mod adhesion;
+mod anisotropic_friction;
+mod arm_compliance;
+mod com_offset;
+mod constant_force;
+mod contact_compliance;
+mod friction_level;
+mod friction_patch;
+mod hidden_obstacle;
+mod mass_leak;
+mod pressure_distribution;
+mod quadratic_drag;
+mod restitution;
 mod rolling_resistance;
+mod static_friction;
+mod stribeck_friction;
 mod table_tilt;
+mod tether;
 mod viscous_damping;
 
+pub use adhesion::Adhesion;
+pub use anisotropic_friction::AnisotropicFriction;
+pub use arm_compliance::ArmCompliance;
+pub use com_offset::ComOffset;
+pub use constant_force::ConstantForce;
+pub use contact_compliance::ContactCompliance;
+pub use friction_level::FrictionLevel;
+pub use friction_patch::FrictionPatch;
+pub use hidden_obstacle::HiddenObstacle;
+pub use mass_leak::MassLeak;
+pub use pressure_distribution::PressureDistribution;
+pub use quadratic_drag::QuadraticDrag;
+pub use restitution::Restitution;
 pub use rolling_resistance::RollingResistance;
+pub use static_friction::StaticFriction;
+pub use stribeck_friction::StribeckFriction;
 pub use table_tilt::TableTilt;
+pub use tether::Tether;
 pub use viscous_damping::ViscousDamping;
+
+#[cfg(test)]
+mod tests {
+    use crate::config::{ObstacleMobility, WorldConfig};
+    use crate::effect::{CommandSpace, CommandStart, Effect, Nominal, ToolMoment};
+    use crate::state::{BodyState, MAX_JOINTS};
+    use crate::theta::{ObjectShape, ObjectTheta, Theta};
+
+    /// The usual box in the usual world.
+    pub(super) fn nominal() -> Nominal {
+        let world = WorldConfig {
+            control_period_secs: 1.0 / 60.0,
+            control_steps: 20,
+            solver_iterations: 2,
+            contact_frequency_hz: 60.0,
+            contact_damping_ratio: 5.0,
+            table_height_m: 0.0,
+            gravity_mps2: 9.81,
+            tool_friction: 0.2,
+            obstacle_friction: 0.5,
+            arm_stiffness_npm: 50_000.0,
+            restitution: 0.0,
+            obstacle_mobility: ObstacleMobility::Fixed,
+        };
+        let object =
+            ObjectTheta { shape: ObjectShape::Box, mass_kg: 0.5, com_m: [0.0; 3], friction: 0.4, size_m: [0.08; 3] };
+        Nominal::new(&world, &Theta { object, obstacle: None })
+    }
+
+    /// Commands of the tool centre from `at` on, 60 a second.
+    pub(super) fn tool_start(at: &[f64]) -> CommandStart<'_> {
+        CommandStart { space: CommandSpace::Tool, at, period_secs: 1.0 / 60.0, play_rad: [0.0; MAX_JOINTS] }
+    }
+
+    /// An upright tool that stands still.
+    pub(super) fn moment(time_secs: f64) -> ToolMoment {
+        ToolMoment { time_secs, orientation: [0.0, 0.0, 0.0, 1.0], acceleration_mps2: [0.0; 3], gravity_mps2: 9.81 }
+    }
+
+    /// A reading leads back to its state.
+    pub(super) fn assert_unread(effect: &dyn Effect) {
+        let mut state = BodyState::at_rest([0.5, -0.2, 0.04], 0.7);
+        state.linear_mps = [0.1, 0.2, -0.3];
+        state.angular_rps = [1.0, -2.0, 3.0];
+        let mut body = state;
+        effect.read(&mut body);
+        assert_ne!(body, state);
+        effect.unread(&mut body);
+        for (found, expected) in body.to_array().iter().zip(state.to_array()) {
+            assert!((found - expected).abs() < 1e-12, "{body:?} and {state:?}");
+        }
+    }
+}
