@@ -2,16 +2,29 @@
 //!
 //! Ranges without a source are engineering judgement. Letters say where an effect acts, as in [`crate::effect`].
 
+mod actuation_delay;
+mod actuator_gain;
 mod adhesion;
 mod anisotropic_friction;
 mod arm_compliance;
+mod backlash;
 mod com_offset;
 mod constant_force;
 mod contact_compliance;
+mod force_bias;
+mod force_drift;
+mod force_gain;
+mod force_low_pass;
+mod force_saturation;
 mod friction_level;
 mod friction_patch;
 mod hidden_obstacle;
+mod joint_friction;
 mod mass_leak;
+mod pose_delay;
+mod pose_offset;
+mod pose_rotation;
+mod pose_scale;
 mod pressure_distribution;
 mod quadratic_drag;
 mod restitution;
@@ -20,18 +33,33 @@ mod static_friction;
 mod stribeck_friction;
 mod table_tilt;
 mod tether;
+mod time_base;
 mod viscous_damping;
+mod wrist_payload;
 
+pub use actuation_delay::ActuationDelay;
+pub use actuator_gain::ActuatorGain;
 pub use adhesion::Adhesion;
 pub use anisotropic_friction::AnisotropicFriction;
 pub use arm_compliance::ArmCompliance;
+pub use backlash::Backlash;
 pub use com_offset::ComOffset;
 pub use constant_force::ConstantForce;
 pub use contact_compliance::ContactCompliance;
+pub use force_bias::ForceBias;
+pub use force_drift::ForceDrift;
+pub use force_gain::ForceGain;
+pub use force_low_pass::ForceLowPass;
+pub use force_saturation::ForceSaturation;
 pub use friction_level::FrictionLevel;
 pub use friction_patch::FrictionPatch;
 pub use hidden_obstacle::HiddenObstacle;
+pub use joint_friction::JointFriction;
 pub use mass_leak::MassLeak;
+pub use pose_delay::PoseDelay;
+pub use pose_offset::PoseOffset;
+pub use pose_rotation::PoseRotation;
+pub use pose_scale::PoseScale;
 pub use pressure_distribution::PressureDistribution;
 pub use quadratic_drag::QuadraticDrag;
 pub use restitution::Restitution;
@@ -40,7 +68,9 @@ pub use static_friction::StaticFriction;
 pub use stribeck_friction::StribeckFriction;
 pub use table_tilt::TableTilt;
 pub use tether::Tether;
+pub use time_base::TimeBase;
 pub use viscous_damping::ViscousDamping;
+pub use wrist_payload::WristPayload;
 
 #[cfg(test)]
 mod tests {
