@@ -62,6 +62,8 @@ pub(crate) struct Simulation<'a> {
     drive: Option<Drive>,
     world: Option<World<'a>>,
     way: Way,
+    /// Where the last command sends the tool, m: on its way, unless an effect says otherwise.
+    sent_m: [f64; 3],
     /// Nothing happens in all of the action.
     quiet: bool,
     /// Nothing happens any more.
@@ -94,6 +96,7 @@ impl<'a> Simulation<'a> {
             drive,
             world: None,
             way,
+            sent_m: start,
             quiet: false,
             ended: false,
         };
@@ -121,6 +124,7 @@ impl<'a> Simulation<'a> {
             let tool = ToolPose { position_m: self.way.position_m, ..self.course.tool };
             self.advance(step.min(steps));
             let (position, joints) = self.commanded(period_secs);
+            self.sent_m = position;
             let quiet = self.quiet || self.ended || (self.world.is_none() && self.nothing_near(&tool, position));
             let (wrench, against) = if quiet {
                 (Wrench::default(), false)
@@ -247,7 +251,7 @@ impl<'a> Simulation<'a> {
                 body.linear_mps = [0.0; 3];
                 body.angular_rps = [0.0; 3];
             }
-            return End { joints_rad: driven, play_rad, seen, duration_secs, tool_m: self.way.position_m, ..end };
+            return End { joints_rad: driven, play_rad, seen, duration_secs, tool_m: self.sent_m, ..end };
         };
         let object = world.object();
         // What cannot move keeps its last digits, which the engine does not have.
@@ -255,7 +259,7 @@ impl<'a> Simulation<'a> {
         let obstacle = if movable { world.obstacle() } else { self.particle.state.obstacle };
         let gives_way = world.tool_gives_way();
         let driven = driven.filter(|_| !gives_way);
-        let tool_m = if gives_way { world.tool_position_m() } else { self.way.position_m };
+        let tool_m = if gives_way { world.tool_position_m() } else { self.sent_m };
         let joints_rad = world.arm_joints_rad().or(driven);
         let tool = match &joints_rad {
             Some(joints) => self.model.tool_pose(joints),
