@@ -1,6 +1,7 @@
 //! The loop.
 
 use belief::Particles;
+use physics_model::effect::unknown::{log_density as log_density_of_effects, sample as sample_effects};
 use physics_model::{Action, GoalPolicy, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::Pomcp;
 use pomdp::{Discretise as _, Outcome, Policy, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
@@ -157,7 +158,7 @@ impl<'a> Agent<'a> {
         streams: &mut Streams,
     ) -> Result<Option<Mind<'m>>, Error> {
         let Context { model, observation, .. } = *context;
-        let proposals = match &mut self.prior {
+        let mut proposals = match &mut self.prior {
             Some(prior) => {
                 prior.suggest(Some(&record.action), observation);
                 let count = self.problem.scenario.agent.proposals;
@@ -167,9 +168,14 @@ impl<'a> Agent<'a> {
         };
         Ok(Some(match mind {
             Mind::Belief(mut search, particles, mut filter) => {
+                complete_effects(self.problem, &particles, &mut proposals, &mut streams.suggestion);
                 let mobility = model.config().world.obstacle_mobility;
                 let prior = self.prior.as_ref();
-                let density = |p: &Particle| prior.map_or(f64::NEG_INFINITY, |prior| prior.log_density(mobility, p));
+                let unknown = &self.problem.beliefs.effects;
+                let density = |p: &Particle| {
+                    let log_density = prior.map_or(f64::NEG_INFINITY, |prior| prior.log_density(mobility, p));
+                    log_density + log_density_of_effects(unknown, &p.theta.effects)
+                };
                 let proposals = match self.method {
                     Method::Mixture => Proposals::weighted(&proposals, &density),
                     _ => Proposals::unweighted(&proposals),
@@ -301,6 +307,16 @@ fn suggest(prior: &Suggester, method: Method, context: &Context<'_>, count: usiz
         particles.extend(prior.sample(table_height_m, rng).and_then(complete));
     }
     particles
+}
+
+/// What the network knows nothing of: unknown parameters of effects, from their first distribution, and what effects remember, from the
+/// belief before the action.
+fn complete_effects(problem: &Problem, belief: &Particles<Particle>, proposals: &mut [Particle], rng: &mut Rng) {
+    let memory = belief.iter().next().and_then(|(particle, _)| problem.model.memory_after_action(particle));
+    for particle in proposals {
+        particle.theta.effects = sample_effects(&problem.beliefs.effects, rng);
+        particle.memory.clone_from(&memory);
+    }
 }
 
 /// An error with its causes.

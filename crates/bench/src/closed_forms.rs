@@ -73,7 +73,7 @@ pub fn measure(root: &Path, config: &WorldConfig) -> Result<Vec<Measure>> {
 }
 
 fn theta(shape: ObjectShape, size_m: [f64; 3], mass_kg: f64, friction: f64, com_m: [f64; 3]) -> Theta {
-    Theta { object: ObjectTheta { shape, mass_kg, com_m, friction, size_m }, obstacle: None }
+    Theta { object: ObjectTheta { shape, mass_kg, com_m, friction, size_m }, obstacle: None, effects: vec![] }
 }
 
 /// Runs a body that nothing touches; `each` sees it after every control step.

@@ -112,6 +112,7 @@ fn theta(obstacle: bool) -> Theta {
             mass_kg: 1.0,
             size_m: [0.05, 0.05, 0.09],
         }),
+        effects: vec![],
     }
 }
 

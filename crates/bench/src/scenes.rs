@@ -185,7 +185,7 @@ fn parse(row: &Row) -> Result<(Scene, Outcome)> {
     };
     let scene = Scene {
         name: row.text("name")?.into(),
-        theta: Theta { object, obstacle: obstacle.as_ref().map(|(theta, _, _)| theta.clone()) },
+        theta: Theta { object, obstacle: obstacle.as_ref().map(|(theta, _, _)| theta.clone()), effects: vec![] },
         object: BodyState::at_rest(
             row.numbers(["object_x_m", "object_y_m", "object_z_m"])?,
             row.number("object_yaw_rad")?,

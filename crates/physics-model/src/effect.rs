@@ -23,6 +23,7 @@ pub mod catalogue;
 pub mod memory;
 pub mod parameter;
 pub mod signal;
+pub mod unknown;
 
 use crate::config::WorldConfig;
 use crate::robot::JointVector;
@@ -33,6 +34,7 @@ pub use catalogue::{EffectConfig, EffectKind};
 pub use memory::Memory;
 pub use parameter::{Neutral, Parameter, Parametric, Scale};
 pub use signal::{CommandFilter, CommandSpace, CommandStart, ForceFilter, ToolMoment};
+pub use unknown::{EffectDistributions, EffectParameter, EffectValue};
 
 /// Which free body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -50,6 +50,16 @@ pub enum EffectError {
         /// All names.
         known: String,
     },
+    /// An effect has no parameter of this name.
+    #[error("{effect} has no parameter {name:?}: {known} exist")]
+    UnknownParameter {
+        /// Name of the effect.
+        effect: &'static str,
+        /// The name.
+        name: String,
+        /// All names.
+        known: String,
+    },
     /// A vector of parameters has another length.
     #[error("{effect} has {expected} parameters, found {found} values")]
     Count {

@@ -182,6 +182,10 @@ pub fn check_theta(theta: &Theta) -> Result<(), Impossible> {
             range("obstacle size (m)", *size, 0.005, 1.0)?;
         }
     }
+    for effect in &theta.effects {
+        let [low, high] = effect.parameter.parameter().limits;
+        range(effect.parameter.parameter().name, effect.value, low, high)?;
+    }
     Ok(())
 }
 

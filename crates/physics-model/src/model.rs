@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::action::Action;
 use crate::config::{ArmConfig, ForceSensing, PushConfig};
-use crate::effect::{Effect, EffectConfig, Hooks, Memory, Nominal, ToolMoment, signal};
+use crate::effect::{Effect, EffectConfig, Hooks, Memory, Nominal, ToolMoment, signal, unknown};
 use crate::error::Impossible;
 use crate::feasible::{check_overlaps, check_theta};
 use crate::force::{ForceSensor, resting_reading};
@@ -20,7 +20,7 @@ use crate::reward::Events;
 use crate::robot::Robot;
 use crate::sensor::{Observation, ObservationKey, Readings};
 use crate::simulation::{Course, Simulation};
-use crate::state::State;
+use crate::state::{BodyState, State};
 use crate::theta::Theta;
 use crate::world::{Divergence, ToolPose};
 
@@ -143,10 +143,35 @@ impl PushModel {
         if let Some(memory) = &particle.memory {
             memory.apply_lag(&mut object);
         }
-        if self.effects_of(particle).hooks.contains(Hooks::POSE) {
-            object = signal::read(self.effects_of(particle).list, &object);
+        let own = self.own_effects(&particle.theta);
+        let effects = Effects::new(own.as_deref().unwrap_or(&self.effects));
+        if effects.hooks.contains(Hooks::POSE) {
+            object = signal::read(effects.list, &object);
         }
         Readings { joints_rad: particle.state.joints_rad.clone(), force: particle.force, object }
+    }
+
+    /// The state behind a measured pose, at rest, as the effects of the list have it: what an offset or a turned frame has made of it is undone.
+    #[must_use]
+    pub fn unread_pose(&self, (position_m, orientation): ([f64; 3], [f64; 4])) -> ([f64; 3], [f64; 4]) {
+        if !Hooks::of(&self.effects).contains(Hooks::POSE) {
+            return (position_m, orientation);
+        }
+        let reading = BodyState { position_m, orientation, ..BodyState::at_rest([0.0; 3], 0.0) };
+        let body = signal::unread(&self.effects, &reading);
+        (body.position_m, body.orientation)
+    }
+
+    /// What a hypothesis that joins the belief after an action remembers, by one that was in it before: the time. `None` where no effect
+    /// needs it.
+    #[must_use]
+    pub fn memory_after_action(&self, before: &Particle) -> Option<Box<Memory>> {
+        let own = self.own_effects(&before.theta);
+        Hooks::of(own.as_deref().unwrap_or(&self.effects)).contains(Hooks::MEMORY).then(|| {
+            let mut memory = before.memory.clone().unwrap_or_default();
+            memory.elapsed_secs += self.config.world.control_period_secs * f64::from(self.config.world.control_steps);
+            memory
+        })
     }
 
     /// The force readings that an observation holds (see [`Readings::force`]).
@@ -179,7 +204,8 @@ impl PushModel {
             acceleration_mps2: [0.0; 3],
             gravity_mps2: self.config.world.gravity_mps2,
         };
-        let effects = self.effects_of(particle);
+        let own = self.own_effects(&particle.theta);
+        let effects = Effects::new(own.as_deref().unwrap_or(&self.effects));
         let sensor = &self.config.sensor;
         particle.force = resting_reading(&self.robot, sensor, effects, &particle.state.joints_rad, &moment);
         self.config.sensor.observe(&self.readings(particle), rng)
@@ -199,7 +225,8 @@ impl PushModel {
         report.events.out_of_reach = goal_joints.is_none();
 
         let course = Course { tool, target_m: if goal_joints.is_some() { target } else { start } };
-        let effects = self.effects_of(particle);
+        let own = self.own_effects(&particle.theta);
+        let effects = Effects::new(own.as_deref().unwrap_or(&self.effects));
         let nominal = Nominal::with_effects(&self.config.world, &particle.theta, effects.list);
         let period_secs = nominal.as_ref().map_or(&self.config.world, |nominal| &nominal.world).control_period_secs;
         let path = self.joint_path(effects, &particle.state.joints_rad, goal_joints.as_deref(), start, target);
@@ -277,8 +304,9 @@ impl PushModel {
         })
     }
 
-    fn effects_of(&self, _particle: &Particle) -> Effects<'_> {
-        Effects::new(&self.effects)
+    /// The effects with a hypothesis's own values; `None` where it has none and [`Self::effects`] are its own.
+    fn own_effects(&self, theta: &Theta) -> Option<Vec<Box<dyn Effect>>> {
+        (!theta.effects.is_empty()).then(|| unknown::build(&self.config.effects, &theta.effects))
     }
 }
 

@@ -26,7 +26,8 @@ pub struct Cell {
 ///
 /// - object: ln mass, logit of the friction coefficient, ln of the sizes that its shape has, logit of the centre of mass between the shape's
 ///   surfaces (all three axes of a box or cylinder; the depth below the centre of a sphere);
-/// - obstacle: ln sizes; if it can move, ln mass; if not, its x, y (m) and yaw (rad), which no action changes.
+/// - obstacle: ln sizes; if it can move, ln mass; if not, its x, y (m) and yaw (rad), which no action changes;
+/// - effects: unknown parameters as they are; one outside its limits is no world.
 impl StaticParameters for PushModel {
     type Structure = Shapes;
 
@@ -55,6 +56,7 @@ impl StaticParameters for PushModel {
                 ObstacleMobility::Fixed => values.extend([body.position_m[0], body.position_m[1], body.yaw_rad()]),
             }
         }
+        values.extend(particle.theta.effects.iter().map(|effect| effect.value));
         values
     }
 
@@ -102,6 +104,9 @@ impl StaticParameters for PushModel {
             if stands {
                 body.position_m[2] = table_m + obstacle.shape.half_height_m(obstacle.size_m);
             }
+        }
+        for effect in &mut next.theta.effects {
+            effect.value = values.next()?;
         }
         if values.next().is_some() {
             return None;

@@ -11,6 +11,8 @@ use crate::theta::{ObjectShape, standard_com_m};
 /// Smallest size and mass that noise may lead to.
 const SMALLEST_SIZE_M: f64 = 0.01;
 const SMALLEST_MASS_KG: f64 = 0.01;
+/// Standard deviation of noise on an effect's parameter, as a share of its plausible range.
+const EFFECT_SHARE: f64 = 0.1;
 /// Heights within this distance of the resting height count as resting on the table, m.
 const RESTING_TOLERANCE_M: f64 = 0.005;
 
@@ -31,6 +33,11 @@ pub(crate) fn perturb(config: &PerturbConfig, table_height_m: f64, particle: &mu
     noisy_body(config, &mut particle.state.object, rng);
     if resting {
         particle.state.object.position_m[2] = table_height_m + o.shape.half_height_m(o.size_m);
+    }
+    for effect in &mut theta.effects {
+        let parameter = effect.parameter.parameter();
+        let ([from, to], [low, high]) = (parameter.plausible, parameter.limits);
+        effect.value = (effect.value + normal(EFFECT_SHARE * (to - from), rng)).clamp(low, high);
     }
     if let (Some(o), Some(body)) = (&mut theta.obstacle, &mut particle.state.obstacle) {
         let resting = rests(table_height_m, o.shape, o.size_m, body);
@@ -109,6 +116,7 @@ mod tests {
                     size_m: [0.08; 3],
                 },
                 obstacle: None,
+                effects: Vec::new(),
             },
         );
         let mut rng = Seed(3).stream(Purpose::Test, 0);

@@ -4,8 +4,9 @@ use pomdp::Rng;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, Gamma};
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{ContinuousCDF as _, Normal};
+use statrs::distribution::{Continuous as _, ContinuousCDF as _, Normal};
 
+use crate::effect::{EffectDistributions, unknown};
 use crate::model::{Particle, PushModel};
 use crate::state::{BodyState, State};
 use crate::theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta, standard_com_m};
@@ -40,6 +41,18 @@ impl TruncatedNormal {
         };
         let (a, b) = (normal.cdf(self.low), normal.cdf(self.high));
         normal.inverse_cdf(a + u * (b - a)).clamp(self.low, self.high)
+    }
+
+    /// ln of the density of [`Self::sample`]; −∞ outside the limits, and +∞ at the mean if there is no spread.
+    #[must_use]
+    pub fn log_density(&self, value: f64) -> f64 {
+        if !(self.low..=self.high).contains(&value) {
+            return f64::NEG_INFINITY;
+        }
+        let Ok(normal) = Normal::new(self.mean, self.stddev) else {
+            return if value == self.mean.clamp(self.low, self.high) { f64::INFINITY } else { f64::NEG_INFINITY };
+        };
+        normal.ln_pdf(value) - (normal.cdf(self.high) - normal.cdf(self.low)).ln()
     }
 
     /// What is wrong with the parameters, if anything.
@@ -162,6 +175,9 @@ pub struct WorldDistribution {
     pub object: ObjectDistribution,
     /// Obstacle.
     pub obstacle: ObstacleDistribution,
+    /// Unknown parameters of effects, none in most scenarios.
+    #[serde(default, skip_serializing_if = "EffectDistributions::is_empty")]
+    pub effects: EffectDistributions,
 }
 
 impl WorldDistribution {
@@ -205,6 +221,7 @@ impl WorldDistribution {
                 let f = &o.friction;
                 (f.low < 0.0 || f.high > 1.0).then(|| "object.friction: expected a range within [0, 1]".into())
             })
+            .or_else(|| unknown::problem(&self.effects))
     }
 
     /// Draws Θ and the poses; nothing is checked for overlap.
@@ -235,9 +252,14 @@ impl WorldDistribution {
             (ObstacleTheta { shape, mass_kg, size_m }, BodyState::at_rest(position, b.yaw_rad.sample(rng)))
         });
         let (obstacle_theta, obstacle_state) = obstacle.unzip();
+        let effects = unknown::sample(&self.effects, rng);
         Particle::new(
             State { joints_rad: joints_rad.to_vec(), object, obstacle: obstacle_state },
-            Theta { object: ObjectTheta { shape, mass_kg, com_m, friction, size_m }, obstacle: obstacle_theta },
+            Theta {
+                object: ObjectTheta { shape, mass_kg, com_m, friction, size_m },
+                obstacle: obstacle_theta,
+                effects,
+            },
         )
     }
 

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::effect::EffectValue;
+
 /// Shape of the target object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -127,7 +129,7 @@ pub struct ObstacleTheta {
     pub size_m: [f64; 3],
 }
 
-/// Θ: 12 continuous and 2 discrete values.
+/// Θ: 12 continuous and 2 discrete values, and the parameters of effects that a scenario makes unknown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Theta {
@@ -135,6 +137,9 @@ pub struct Theta {
     pub object: ObjectTheta,
     /// The obstacle; `None` where there is none.
     pub obstacle: Option<ObstacleTheta>,
+    /// Unknown parameters of effects, none in most scenarios. Neither datasets nor the network's layout hold them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<EffectValue>,
 }
 
 /// The discrete values of Θ: names, and labels by class index.
@@ -226,6 +231,7 @@ impl Theta {
                 size_m: sizes(shape, &values[5..8]),
             },
             obstacle,
+            effects: Vec::new(),
         }
     }
 }
@@ -245,6 +251,7 @@ mod tests {
                 size_m: [0.03, 0.1, 0.0],
             },
             obstacle: Some(ObstacleTheta { shape: ObjectShape::Sphere, mass_kg: 2.0, size_m: [0.05, 0.0, 0.0] }),
+            effects: Vec::new(),
         };
         assert_eq!(Theta::from_parts(&theta.continuous(), theta.classes()), theta);
         assert_eq!(theta.applies().iter().filter(|a| **a).count(), 5 + 2 + 1 + 1);

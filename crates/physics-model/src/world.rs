@@ -100,7 +100,7 @@ pub struct World<'a> {
 
 impl<'a> World<'a> {
     /// Builds the world of `theta` in the state given by the bodies and the tool pose. Values must have passed
-    /// [`crate::feasible::check_theta`].
+    /// [`crate::feasible::check_theta`]; those of effects are the ones in `effects`, not in `theta`.
     #[must_use]
     pub fn restore(
         config: &'a WorldConfig,
@@ -187,7 +187,7 @@ impl<'a> World<'a> {
     #[must_use]
     pub fn with_memory(mut self, memory: &Memory) -> Self {
         self.time_secs = memory.elapsed_secs;
-        for (body, state) in self.hidden.iter().zip(&memory.hidden) {
+        for (body, state) in self.hidden.iter().zip(&memory.hidden).filter(|(body, _)| body.dynamic) {
             let rigid = &mut self.physics.bodies[body.handle];
             rigid.set_position(pose(state.position_m, state.orientation), true);
             rigid.set_linvel(vector(state.linear_mps), true);

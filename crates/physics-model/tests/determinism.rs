@@ -35,7 +35,7 @@ fn hypothesis(model: &PushModel, joints: &[f64], item: u64) -> Particle {
             object: BodyState::at_rest(at, rng.random_range(-0.5..0.5)),
             obstacle: None,
         },
-        Theta { object, obstacle: None },
+        Theta { object, obstacle: None, effects: vec![] },
     );
     if item.is_multiple_of(3) {
         let size_m = [0.05, 0.05, 0.09];

@@ -44,7 +44,10 @@ fn particle(model: &PushModel, joints: &[f64], ahead_m: f64) -> Particle {
         size_m: [0.08, 0.08, 0.1],
     };
     let body = BodyState::at_rest([tool[0], tool[1] + ahead_m, model.config().world.table_height_m + 0.05], 0.0);
-    Particle::new(State { joints_rad: joints.to_vec(), object: body, obstacle: None }, Theta { object, obstacle: None })
+    Particle::new(
+        State { joints_rad: joints.to_vec(), object: body, obstacle: None },
+        Theta { object, obstacle: None, effects: vec![] },
+    )
 }
 
 fn with_obstacle(mut particle: Particle, beyond_object_m: f64) -> Particle {

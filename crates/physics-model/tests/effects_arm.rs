@@ -39,7 +39,10 @@ fn particle(model: &PushModel, joints: &[f64], ahead_m: f64) -> Particle {
         size_m: [0.08, 0.08, 0.1],
     };
     let body = BodyState::at_rest([x, y + ahead_m, model.config().world.table_height_m + 0.05], 0.0);
-    Particle::new(State { joints_rad: joints.to_vec(), object: body, obstacle: None }, Theta { object, obstacle: None })
+    Particle::new(
+        State { joints_rad: joints.to_vec(), object: body, obstacle: None },
+        Theta { object, obstacle: None, effects: vec![] },
+    )
 }
 
 #[test]
@@ -270,8 +273,8 @@ fn an_arm_with_friction_is_a_dynamic_one_or_has_torque_sensors() {
     let (mut first, mut second) = (particle(&rough, &joints, 0.4), particle(&plain, &joints, 0.4));
     rough.act(&mut first, PLUS_Y, &mut rng());
     plain.act(&mut second, PLUS_Y, &mut rng());
-    for j in 0..joints.len() {
-        let rate = (second.state.joints_rad[j] - joints[j]) * 3.0;
+    for (j, start) in joints.iter().enumerate() {
+        let rate = (second.state.joints_rad[j] - start) * 3.0;
         let more = first.force[j] - second.force[j];
         // The mean of F_v q̇ + F_c over a move that takes a third of a second, its slow ends aside.
         if rate.abs() > 0.1 {

@@ -38,7 +38,11 @@ fn fine() -> WorldConfig {
 }
 
 fn object(shape: ObjectShape, size_m: [f64; 3]) -> Theta {
-    Theta { object: ObjectTheta { shape, mass_kg: 0.5, com_m: [0.0; 3], friction: 0.4, size_m }, obstacle: None }
+    Theta {
+        object: ObjectTheta { shape, mass_kg: 0.5, com_m: [0.0; 3], friction: 0.4, size_m },
+        obstacle: None,
+        effects: vec![],
+    }
 }
 
 fn list(effect: impl Effect + 'static) -> Vec<Box<dyn Effect>> {

@@ -5,7 +5,7 @@ mod support;
 use std::sync::Arc;
 
 use physics_model::config::{ArmConfig, ObstacleMobility, ServoConfig};
-use physics_model::effect::EffectKind;
+use physics_model::effect::{EffectKind, Parameter};
 use physics_model::{
     Action, BodyState, EffectConfig, EffectError, ObjectShape, ObjectTheta, Observation, Particle, PushConfig,
     PushModel, State, Theta,
@@ -41,7 +41,7 @@ fn particle(model: &PushModel, joints: &[f64], shape: ObjectShape) -> Particle {
         .map(|millimetres| {
             let body = BodyState::at_rest([x, y + 0.001 * f64::from(millimetres), z], 0.0);
             let state = State { joints_rad: joints.to_vec(), object: body, obstacle: None };
-            Particle::new(state, Theta { object: object.clone(), obstacle: None })
+            Particle::new(state, Theta { object: object.clone(), obstacle: None, effects: vec![] })
         })
         .find(|particle| model.check(particle).is_ok())
         .map(|mut particle| {
@@ -120,7 +120,7 @@ fn the_catalogue_has_34_names_that_scenario_files_know() {
             let x = parameter.scale.coordinate(parameter.typical());
             assert!((parameter.scale.value(x) / parameter.typical() - 1.0).abs() < 1e-12 || x == 0.0);
         }
-        assert!(kind.parameters().iter().any(|parameter| parameter.is_strength()), "{}", kind.name());
+        assert!(kind.parameters().iter().any(Parameter::is_strength), "{}", kind.name());
     }
 }
 

@@ -29,7 +29,7 @@ fn particle(model: &PushModel, joints: &[f64], y_m: f64) -> Particle {
     };
     Particle::new(
         State { joints_rad: joints.to_vec(), object: BodyState::at_rest([x, y_m, table + 0.05], 0.0), obstacle: None },
-        Theta { object, obstacle: None },
+        Theta { object, obstacle: None, effects: vec![] },
     )
 }
 
@@ -86,6 +86,38 @@ fn static_parameters_survive_the_way_to_unconstrained_values_and_back() {
         values[9] += 4.0_f64.ln();
         assert_eq!(model.with_parameters(&states[1], &values), None);
     }
+}
+
+#[test]
+fn unknown_parameters_of_effects_are_moved_by_filters_and_act() {
+    use physics_model::effect::{EffectKind, EffectParameter, EffectValue};
+    let (plain, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let effects = vec![EffectKind::TableTilt.start(), EffectKind::ForceBias.start()];
+    let config = physics_model::PushConfig { effects, ..plain.config().clone() };
+    let model = PushModel::new(config, std::sync::Arc::new(plain.robot().clone()));
+    let value = |kind, name, value| EffectValue { parameter: EffectParameter::new(kind, name).unwrap(), value };
+    let mut tilted = particle(&model, &joints, -0.1);
+    tilted.theta.effects =
+        vec![value(EffectKind::TableTilt, "slope_y_rad", 0.02), value(EffectKind::ForceBias, "bias_z_n", -1.5)];
+    check_static_parameters(&model, std::slice::from_ref(&tilted), 1e-9);
+    check_observation_model(&model, std::slice::from_ref(&tilted), 4);
+    let mut values = model.parameters(&tilted);
+    let last = values.len() - 1;
+    assert_eq!(values[last - 1..], [0.02, -1.5]);
+    (values[last - 1], values[last]) = (0.6, 2.5);
+    let mut moved = model.with_parameters(&tilted, &values).expect("a possible world");
+    assert_eq!(moved.theta.effects[1].value, 2.5);
+    values[last - 1] = 0.8;
+    assert_eq!(model.with_parameters(&tilted, &values), None, "steeper than the limit");
+    // It slides by itself, and the bias is read without contact.
+    let mut rng = Seed(1).stream(Purpose::Test, 0);
+    let before = moved.state.object.position_m[1];
+    model.act(&mut moved, Action::UP, &mut rng);
+    assert!(moved.state.object.position_m[1] > before + 0.02, "{:?}", moved.state.object);
+    let force = moved.force[..3].iter().map(|f| f * f).sum::<f64>().sqrt();
+    assert!((force - 2.5).abs() < 1e-9, "{force}");
+    let suggested = model.memory_after_action(&moved);
+    assert_eq!(suggested, None, "neither effect remembers anything");
 }
 
 #[test]

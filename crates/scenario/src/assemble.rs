@@ -54,6 +54,8 @@ impl Problem {
         })?;
         let worlds = scenario.distribution.clone();
         let mut beliefs = worlds.clone();
+        // A belief is about what the model knows of.
+        beliefs.effects.retain(|kind, _| effects.model.iter().any(|effect| effect.kind() == *kind));
         if scenario.initial_belief.obstacle == InitialObstacle::None {
             beliefs.obstacle.shape = [0.0, 0.0, 0.0, 1.0];
         }
@@ -81,7 +83,7 @@ impl Problem {
         observation: &Observation,
         rng: &mut Rng,
     ) -> Result<Vec<Particle>, Error> {
-        let (position, orientation) = observation.object_pose();
+        let (position, orientation) = self.model.unread_pose(observation.object_pose());
         let noise = &self.scenario.sensor.noise;
         let mut pinned = self.beliefs.clone();
         let pin = |value: f64, stddev: f64| physics_model::sampling::TruncatedNormal {

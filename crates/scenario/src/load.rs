@@ -286,6 +286,34 @@ mod tests {
     }
 
     #[test]
+    fn effects_and_their_unknown_parameters_are_checked() {
+        let set = |texts: &[&str]| load(|s| s.set = texts.iter().map(ToString::to_string).collect());
+        let message = |texts: &[&str]| set(texts).unwrap_err().to_string();
+        let tilt = "effects.model=[{ table_tilt = { slope_x_rad = 0.0, slope_y_rad = 0.0 } }]";
+        let slope =
+            "distribution.effects.table_tilt.slope_x_rad={ mean = 0.0, stddev = 0.02, low = -0.05, high = 0.05 }";
+        let scenario = set(&[tilt, slope]).unwrap();
+        assert_eq!(scenario.distribution.effects.len(), 1);
+        let again: Scenario = toml::from_str(&scenario.to_toml()).unwrap();
+        assert_eq!(again, scenario);
+        let unlisted = message(&[slope]);
+        assert!(
+            unlisted.contains("distribution.effects.table_tilt: expected table_tilt in effects.truth"),
+            "{unlisted}"
+        );
+        let wide = message(&[tilt, &slope.replace("high = 0.05", "high = 5.0")]);
+        assert!(wide.contains("distribution.effects.table_tilt.slope_x_rad") && wide.contains("rad"), "{wide}");
+        let unknown = message(&[tilt, &slope.replace("slope_x_rad", "slope_rad")]);
+        assert!(unknown.contains("slope_x_rad, slope_y_rad exist"), "{unknown}");
+        let steep = message(&["effects.truth=[{ table_tilt = { slope_x_rad = 0.0, slope_y_rad = 1.0 } }]"]);
+        assert!(steep.contains("table_tilt.slope_y_rad: expected -0.7 to 0.7 rad, found 1"), "{steep}");
+        let misspelt = message(&["effects.truth=[{ teher = { stiffness_npm = 1.0 } }]"]);
+        assert!(misspelt.contains("teher") && misspelt.contains("tether"), "{misspelt}");
+        // Nothing is written of what is not there: old runs keep their hashes.
+        assert!(!set(&[]).unwrap().to_toml().contains("distribution.effects"));
+    }
+
+    #[test]
     fn errors_name_file_key_and_expectation() {
         let message = |set: &str| load(|s| s.set = vec![set.into()]).unwrap_err().to_string();
         let unknown = message("task.horizn=3");

@@ -7,7 +7,7 @@ use physics_model::WorldDistribution;
 use physics_model::config::{
     ArmConfig, ModelErrorConfig, ObstacleMobility, PerturbConfig, PushConfig, SensorConfig, TaskConfig, WorldConfig,
 };
-use physics_model::effect::EffectConfig;
+use physics_model::effect::{EffectConfig, EffectKind};
 use physics_model::robot::RobotConfig;
 use serde::{Deserialize, Serialize};
 
@@ -356,6 +356,11 @@ impl Scenario {
                     .find_map(|(key, v)| check(v.is_finite() && *v >= 0.0, key, "a standard deviation, at least 0", v))
             })
             .or_else(|| self.distribution.problem().map(|p| format!("distribution.{p}")))
+            .or_else(|| {
+                let unlisted = |kind: &&EffectKind| !effects.clone().any(|effect| effect.kind() == **kind);
+                let name = self.distribution.effects.keys().find(unlisted)?.name();
+                Some(format!("distribution.effects.{name}: expected {name} in effects.truth or effects.model"))
+            })
             .or_else(|| check(share(d.movable_share), "data.movable_share", "0 to 1", &d.movable_share))
             .or_else(|| check(share(d.goal_share), "data.goal_share", "0 to 1", &d.goal_share))
             .or_else(|| check(share(d.exploration_share), "data.exploration_share", "0 to 1", &d.exploration_share))

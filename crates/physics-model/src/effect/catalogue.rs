@@ -177,6 +177,13 @@ impl EffectConfig {
         Ok(effect)
     }
 
+    /// Sets one continuous value, unchecked.
+    pub(crate) fn set_value(&mut self, index: usize, value: f64) {
+        let mut values = self.values();
+        values[index] = value;
+        self.set_values(&values);
+    }
+
     /// Whether all parameters are within their limits.
     ///
     /// # Errors

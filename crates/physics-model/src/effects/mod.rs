@@ -97,7 +97,7 @@ mod tests {
         };
         let object =
             ObjectTheta { shape: ObjectShape::Box, mass_kg: 0.5, com_m: [0.0; 3], friction: 0.4, size_m: [0.08; 3] };
-        Nominal::new(&world, &Theta { object, obstacle: None })
+        Nominal::new(&world, &Theta { object, obstacle: None, effects: vec![] })
     }
 
     /// Commands of the tool centre from `at` on, 60 a second.
