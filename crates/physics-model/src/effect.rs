@@ -127,7 +127,7 @@ pub struct Nominal {
     pub world: WorldConfig,
     /// Θ.
     pub theta: Theta,
-    /// Where object bears on the table, as a share of the way from its centre to the corners or the rim; `None`: as the engine finds contacts.
+    /// Where the object bears on the table, as a share of the way from its centre to the corners or the rim; `None`: as the engine finds contacts.
     pub support_share: Option<f64>,
     /// Stiffness, N/m, of the spring that holds the tool; infinite for a tool that is where it is commanded to be.
     pub tool_stiffness_npm: f64,

@@ -178,6 +178,29 @@ fn every_effect_shows_in_a_push() {
 }
 
 #[test]
+fn the_ends_of_all_ranges_are_worlds_or_are_reported() {
+    for arm in ["sawyer", "jaco"] {
+        let (_, joints) = model(arm, vec![]);
+        for variant in EffectKind::ALL.iter().flat_map(|kind| kind.variants()) {
+            let parameters = variant.kind().parameters();
+            for end in 0..2 {
+                for range in [|p: &Parameter| p.plausible, |p: &Parameter| p.limits] {
+                    let values: Vec<f64> = parameters.iter().map(|parameter| range(parameter)[end]).collect();
+                    let effect = variant.with_parameters(&values).expect("the ends belong to the range");
+                    let (model, _) = model(arm, vec![effect.clone()]);
+                    for shape in ObjectShape::ALL {
+                        // Far beyond what is plausible a world may diverge; it must say so and stay finite.
+                        let (seen, particle, _) = play(&model, &joints, shape);
+                        let finite = seen.iter().all(|observation| observation.0.iter().all(|v| v.is_finite()));
+                        assert!(finite && particle.state.to_vec().iter().all(|v| v.is_finite()), "{arm} {effect:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn all_pairs_of_effects_combine() {
     for arm in ["sawyer", "jaco"] {
         let (plain, joints) = model(arm, vec![]);
