@@ -76,6 +76,28 @@ pub fn write(path: &Path, bytes: &[u8], existing: Existing) -> Result<bool, Erro
     Ok(true)
 }
 
+/// Removes the temporary files that killed writers have left in `folder`, not below it; nobody may be writing there. Returns how many.
+///
+/// # Errors
+///
+/// [`Error`] where the folder cannot be listed or a file cannot be removed. A folder that is not there holds none.
+pub fn sweep(folder: &Path) -> Result<usize, Error> {
+    let entries = match std::fs::read_dir(folder) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(0),
+        listed => listed.map_err(Error::at("list", folder))?,
+    };
+    let mut removed = 0;
+    for entry in entries {
+        let path = entry.map_err(Error::at("list", folder))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with('.') && name.ends_with(".partial") {
+            std::fs::remove_file(&path).map_err(Error::at("remove", &path))?;
+            removed += 1;
+        }
+    }
+    Ok(removed)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,6 +115,17 @@ mod tests {
             assert_eq!(std::fs::read(&path).unwrap(), content);
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_killed_writers_left_is_swept_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in [".a.json.x7Yz.partial", "a.json", ".hidden", "b.partial"] {
+            std::fs::write(folder.path().join(name), "").unwrap();
+        }
+        assert_eq!(sweep(folder.path()).unwrap(), 1);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+        assert_eq!(sweep(&folder.path().join("none")).unwrap(), 0);
     }
 
     #[test]
