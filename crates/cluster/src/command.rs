@@ -38,7 +38,9 @@ impl Asked {
         if output.status.success() {
             return Ok(String::from_utf8_lossy(&output.stdout).trim().to_string());
         }
-        let said = String::from_utf8_lossy(&output.stderr);
+        // What went wrong is on standard error, with HyperQueue's JSON on standard output.
+        let said = if output.stderr.trim_ascii().is_empty() { &output.stdout } else { &output.stderr };
+        let said = String::from_utf8_lossy(said);
         let lines: Vec<&str> = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect();
         let message = if lines.is_empty() { output.status.to_string() } else { lines.join("; ") };
         Err(Error::Refused { executor, program, message })

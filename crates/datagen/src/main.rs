@@ -1,14 +1,16 @@
 //! `cargo xtask datagen`: generates a dataset, shard by shard, resumable.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result, anyhow};
 use clap::Parser;
-use dataset::ShardState;
+use cluster::{Array, Engine, Event, Executor, Lock, Outcome};
+use datagen::Generator;
+use dataset::{Plan, ShardInfo, ShardState};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use scenario::Selection;
@@ -29,7 +31,13 @@ struct Arguments {
     /// Shards to cut the dataset into.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     shards: u32,
-    /// Worker threads [default: all cores].
+    /// Who makes the shards: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/cluster.md.
+    #[arg(long, default_value_t = Executor::Local)]
+    executor: Executor,
+    /// Makes this shard alone, as the tasks of an array do; the dataset is finished by the command without it.
+    #[arg(long, value_name = "SHARD")]
+    worker: Option<u32>,
+    /// Worker threads of the local executor [default: all cores].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
     /// A small dataset, in a minute.
@@ -81,113 +89,195 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => scenario::find_root(&std::env::current_dir()?)?,
-    };
-    let scenario = Selection {
-        robot: arguments.robot.clone(),
-        domain: arguments.scenario.clone(),
-        set: arguments.set.clone(),
-        ..Selection::new(&root)
+    let job = Job::new(arguments)?;
+    if let Some(shard) = arguments.worker {
+        job.plan.open(&job.out)?;
+        job.worker(shard)?;
+        return Ok(true);
     }
-    .load()?;
-    let robot = scenario.robot.name.clone();
-    let transitions = arguments.transitions.unwrap_or(match (arguments.quick, robot.as_str()) {
-        (true, _) => 8_000,
-        (false, "jaco") => 200_000,
-        (false, _) => 150_000,
-    });
-    if transitions == 0 {
-        return Err(anyhow!("--transitions: expected at least 1, found 0"));
+    if let Executor::Engine(engine) = arguments.executor {
+        // Before anything is written: a machine without the engine must not leave a plan behind.
+        engine.check()?;
     }
-    let out = arguments
-        .out
-        .clone()
-        .unwrap_or_else(|| root.join(if arguments.quick { "runs/quick/data" } else { "runs/data" }).join(&robot));
-    let plan = datagen::plan(&scenario, scenario::commit(&root), transitions, arguments.seed, arguments.shards);
-    // Before anything is written: a faulty arm must not leave a plan behind.
-    let generator = datagen::Generator::new(&scenario, &root, arguments.seed)?;
-    plan.open(&out)?;
-    let hash = plan.hash();
-    let missing = missing_shards(&plan, &out, &hash)?;
-    let resumed = plan.shards as usize - missing.len();
+    job.plan.open(&job.out)?;
+    let _lock = Lock::take(&job.out.join("plan.json"))?;
+    let missing = job.missing_shards()?;
+    let resumed = job.plan.shards as usize - missing.len();
     if resumed > 0 {
-        eprintln!("{resumed} of {} shards are finished already", plan.shards);
+        eprintln!("{resumed} of {} shards are finished already", job.plan.shards);
     }
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
-
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build()?;
-    let bar = progress(missing.len() as u64 * plan.episodes_per_shard, "episodes");
+    let bar = progress(missing.len() as u64 * job.plan.episodes_per_shard, "episodes");
     #[expect(clippy::disallowed_methods, reason = "a program may measure its rate")]
     let started = std::time::Instant::now();
-    let made = AtomicU64::new(0);
-    let results: Vec<Result<()>> = pool.install(|| {
-        missing
-            .par_iter()
-            .map(|&index| {
-                if interrupted.load(Ordering::Relaxed) {
-                    return Ok(());
-                }
-                let first = u64::from(index) * plan.episodes_per_shard;
-                let (rows, counts) = generator.shard(first, plan.episodes_per_shard)?;
-                let info = dataset::write_shard(&out, index, &plan.schema, &plan.provenance(), &counts, &rows)?;
-                bar.inc(plan.episodes_per_shard);
-                if bar.is_hidden() {
-                    eprintln!("shard {index}: {} transitions", info.rows - info.episodes);
-                }
-                made.fetch_add(info.rows - info.episodes, Ordering::Relaxed);
-                Ok(())
-            })
-            .collect()
-    });
+    match arguments.executor {
+        Executor::Local => job.play_here(&missing, arguments.threads.unwrap_or(0), &bar, &interrupted)?,
+        Executor::Engine(engine) => job.submit(engine, &missing, &bar, &interrupted)?,
+    }
     bar.finish_and_clear();
-    results.into_iter().collect::<Result<Vec<()>>>().context(Failed)?;
     if interrupted.load(Ordering::Relaxed) {
         return Ok(false);
     }
-    let manifest = dataset::finish(&out, &plan).context(Failed)?;
-    let seconds = started.elapsed().as_secs_f64();
-    let rate = made.load(Ordering::Relaxed) as f64 / seconds;
-    if arguments.json {
-        let summary = serde_json::json!({
-            "out": out, "robot": robot, "transitions": manifest.transitions, "episodes": manifest.episodes,
-            "counts": manifest.counts, "seconds": seconds, "transitions_per_second": rate,
+    let manifest = job.finish().context(Failed)?;
+    job.print(&manifest, &missing, started.elapsed().as_secs_f64(), arguments.json);
+    Ok(true)
+}
+
+/// A dataset to be made.
+struct Job {
+    out: PathBuf,
+    robot: String,
+    plan: Plan,
+    hash: String,
+    generator: Generator,
+}
+
+impl Job {
+    /// Checks the input and writes nothing: a faulty arm must not leave a plan behind.
+    fn new(arguments: &Arguments) -> Result<Self> {
+        let root = match &arguments.root {
+            Some(root) => root.clone(),
+            None => scenario::find_root(&std::env::current_dir()?)?,
+        };
+        let scenario = Selection {
+            robot: arguments.robot.clone(),
+            domain: arguments.scenario.clone(),
+            set: arguments.set.clone(),
+            ..Selection::new(&root)
+        }
+        .load()?;
+        let robot = scenario.robot.name.clone();
+        let transitions = arguments.transitions.unwrap_or(match (arguments.quick, robot.as_str()) {
+            (true, _) => 8_000,
+            (false, "jaco") => 200_000,
+            (false, _) => 150_000,
         });
-        println!("{summary}");
-    } else {
+        if transitions == 0 {
+            return Err(anyhow!("--transitions: expected at least 1, found 0"));
+        }
+        if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards) {
+            return Err(anyhow!("--worker: expected a shard below {}, found {shard}", arguments.shards));
+        }
+        let folder = if arguments.quick { "runs/quick/data" } else { "runs/data" };
+        let out = arguments.out.clone().unwrap_or_else(|| root.join(folder).join(&robot));
+        let commit = match scenario::commit(&root) {
+            // A node without git plays what it was sent to play.
+            unknown if unknown == "unknown" && arguments.worker.is_some() => Plan::read(&out)?.commit,
+            commit => commit,
+        };
+        let plan = datagen::plan(&scenario, commit, transitions, arguments.seed, arguments.shards);
+        let generator = Generator::new(&scenario, &root, arguments.seed)?;
+        Ok(Self { out, robot, hash: plan.hash(), plan, generator })
+    }
+
+    /// Makes a shard, unless it is there.
+    fn make(&self, index: u32) -> Result<ShardInfo> {
+        let plan = &self.plan;
+        let first = u64::from(index) * plan.episodes_per_shard;
+        let (rows, counts) = self.generator.shard(first, plan.episodes_per_shard)?;
+        Ok(dataset::write_shard(&self.out, index, &plan.schema, &plan.provenance(), &counts, &rows)?)
+    }
+
+    /// What a task of an array does.
+    fn worker(&self, shard: u32) -> Result<()> {
+        if !matches!(dataset::shard_state(&self.out, shard, &self.hash)?, ShardState::Finished(_)) {
+            self.make(shard).context(Failed)?;
+        }
+        eprintln!("shard {shard} is finished");
+        Ok(())
+    }
+
+    fn play_here(&self, missing: &[u32], threads: u32, bar: &ProgressBar, interrupted: &AtomicBool) -> Result<()> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build()?;
+        let make = |&index: &u32| {
+            if interrupted.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let info = self.make(index)?;
+            bar.inc(self.plan.episodes_per_shard);
+            if bar.is_hidden() {
+                eprintln!("shard {index}: {} transitions", info.rows - info.episodes);
+            }
+            Ok(())
+        };
+        let results: Vec<Result<()>> = pool.install(|| missing.par_iter().map(make).collect());
+        results.into_iter().collect::<Result<Vec<()>>>().context(Failed)?;
+        Ok(())
+    }
+
+    fn submit(&self, engine: Engine, missing: &[u32], bar: &ProgressBar, interrupted: &AtomicBool) -> Result<()> {
+        let array = Array { engine, label: "datagen", folder: &self.out, processors: 1 };
+        let there = |index: &&u32| self.out.join(dataset::shard_path(**index)).exists();
+        let mut report = |event| match event {
+            Event::News(news) => bar.suspend(|| eprintln!("{news}")),
+            Event::Looked => {
+                bar.set_position(missing.iter().filter(there).count() as u64 * self.plan.episodes_per_shard);
+            }
+        };
+        match array.run(|| self.missing_shards(), interrupted, &mut report) {
+            Ok(Outcome::Finished) => Ok(array.tidy()?),
+            Ok(Outcome::Interrupted) => Ok(()),
+            Err(error) if matches!(error.downcast_ref(), Some(cluster::Error::Unfinished { .. })) => {
+                Err(error.context(Failed))
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn missing_shards(&self) -> Result<Vec<u32>> {
+        let mut missing = Vec::new();
+        for index in 0..self.plan.shards {
+            match dataset::shard_state(&self.out, index, &self.hash)? {
+                ShardState::Finished(_) => {}
+                ShardState::Missing => missing.push(index),
+                ShardState::Broken(reason) => {
+                    let file = self.out.join(dataset::shard_path(index));
+                    return Err(anyhow!(
+                        "{}: expected a whole shard, {reason}: remove the file to make it again",
+                        file.display()
+                    ));
+                }
+            }
+        }
+        Ok(missing)
+    }
+
+    /// Writes the manifest and clears away what killed workers left.
+    fn finish(&self) -> Result<dataset::Manifest> {
+        let manifest = dataset::finish(&self.out, &self.plan)?;
+        let mut folders = vec![self.out.clone(), self.out.join("meta")];
+        folders.extend(manifest.shards.iter().filter_map(|s| self.out.join(&s.path).parent().map(Path::to_path_buf)));
+        folders.dedup();
+        for folder in folders {
+            whole_file::sweep(&folder)?;
+        }
+        Ok(manifest)
+    }
+
+    fn print(&self, manifest: &dataset::Manifest, made: &[u32], seconds: f64, json: bool) {
+        let shards = manifest.shards.iter().filter(|s| made.contains(&s.index));
+        let rate = shards.map(|s| s.rows - s.episodes).sum::<u64>() as f64 / seconds;
+        if json {
+            let summary = serde_json::json!({
+                "out": self.out, "robot": self.robot, "transitions": manifest.transitions, "episodes": manifest.episodes,
+                "counts": manifest.counts, "seconds": seconds, "transitions_per_second": rate,
+            });
+            println!("{summary}");
+            return;
+        }
         println!(
             "{}: {} transitions in {} episodes, {} shards; {}; {:.1} s, {:.0} transitions/s",
-            out.display(),
+            self.out.display(),
             manifest.transitions,
             manifest.episodes,
-            plan.shards,
+            self.plan.shards,
             manifest.counts.iter().map(|(k, v)| format!("{k} {v}")).collect::<Vec<_>>().join(", "),
             seconds,
             rate,
         );
     }
-    Ok(true)
-}
-
-fn missing_shards(plan: &dataset::Plan, out: &std::path::Path, hash: &str) -> Result<Vec<u32>> {
-    let mut missing = Vec::new();
-    for index in 0..plan.shards {
-        match dataset::shard_state(out, index, hash)? {
-            ShardState::Finished(_) => {}
-            ShardState::Missing => missing.push(index),
-            ShardState::Broken(reason) => {
-                let file = out.join(dataset::shard_path(index));
-                return Err(anyhow!(
-                    "{}: expected a whole shard, {reason}: remove the file to make it again",
-                    file.display()
-                ));
-            }
-        }
-    }
-    Ok(missing)
 }
 
 /// A bar with rate and time left on a terminal; hidden elsewhere, where a line a shard is printed instead.
