@@ -129,4 +129,29 @@ pub enum Error {
         /// Name and version then.
         expected: String,
     },
+    /// A trial that nobody has played.
+    #[error("{file}: trial {trial} of {method} is missing: run the same command again")]
+    MissingTrial {
+        /// `trials.jsonl`.
+        file: PathBuf,
+        /// Method.
+        method: &'static str,
+        /// Trial.
+        trial: u32,
+    },
+    /// Two workers have played a trial and did not do the same.
+    #[error(
+        "{file}: trial {trial} of {method} went otherwise than in another log: these nodes do not compute alike; remove one of the two"
+    )]
+    Disagreement {
+        /// Log of a worker.
+        file: PathBuf,
+        /// Method.
+        method: &'static str,
+        /// Trial.
+        trial: u32,
+    },
+    /// The engine, or the lock of the folder.
+    #[error(transparent)]
+    Cluster(#[from] cluster::Error),
 }

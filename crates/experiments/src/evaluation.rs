@@ -8,7 +8,7 @@ use agent::{Agent, Method, Timeouts, WorldAddress};
 use prior::Suggester;
 use scenario::{Filter, Problem, Published, Scenario, Selection};
 
-use crate::{Error, Provenance, Run, RunIdentity, Table, Worlds};
+use crate::{Error, Provenance, Run, RunIdentity, Shard, Table, Worlds};
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -119,6 +119,15 @@ impl Evaluation {
     /// As [`Run::open`].
     pub fn open(&self, folder: &Path) -> Result<Run, Error> {
         Run::open(folder, self.provenance.clone(), &self.scenario.to_toml())
+    }
+
+    /// Opens the run directory `folder`, which is there, for one of its workers.
+    ///
+    /// # Errors
+    ///
+    /// As [`Run::open_worker`].
+    pub fn open_worker(&self, folder: &Path, shard: Shard) -> Result<Run, Error> {
+        Run::open_worker(folder, self.provenance.clone(), shard)
     }
 
     /// Writes the tables of a run whose trials are all played.

@@ -39,14 +39,21 @@ pub(crate) fn claim<T: Serialize>(
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             match ours.iter().map(|name| folder.join(name)).find(|file| file.exists()) {
                 Some(file) => Err(Error::Foreign { file, expected: name }),
-                None => write_atomically(&file, pretty(identity).as_bytes()),
+                None => {
+                    // Never replaced, as it carries the lock of the folder: where another program is quicker, its file counts.
+                    let written = whole_file::write(&file, pretty(identity).as_bytes(), whole_file::Existing::Keep);
+                    written.map_err(|e| file_error(&file, "writing")(e.source))?;
+                    let text = std::fs::read_to_string(&file).map_err(file_error(&file, "reading"))?;
+                    check_identity(&file, &text, identity)
+                }
             }
         }
         Err(e) => Err(file_error(&file, "reading")(e)),
     }
 }
 
-fn check_identity<T: Serialize>(file: &Path, text: &str, expected: &T) -> Result<(), Error> {
+/// Refuses the identity `text` of another run.
+pub(crate) fn check_identity<T: Serialize>(file: &Path, text: &str, expected: &T) -> Result<(), Error> {
     let found: Value = serde_json::from_str(text).unwrap_or(Value::Null);
     let expected = serde_json::to_value(expected).expect("plain data has a JSON form");
     for (key, value) in expected.as_object().expect("a struct is an object") {

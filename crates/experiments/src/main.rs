@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use agent::{Method, Timeouts, WorldAddress};
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use clap::Parser;
-use experiments::{Evaluation, Player, Request, Suite, SuiteRequest};
+use cluster::{Engine, Event, Executor, Outcome};
+use experiments::{Evaluation, Player, Request, Run, Shard, Suite, SuiteRequest};
 use scenario::Selection;
 
 /// Plays trials of methods on a domain, or all tables with --all, and prints the table.
@@ -20,7 +21,7 @@ struct Arguments {
     #[arg(long, required_unless_present = "all")]
     domain: Option<String>,
     /// All tables of scenarios/tables, with their pictures.
-    #[arg(long, conflicts_with_all = ["domain", "robot", "preset", "methods", "world"])]
+    #[arg(long, conflicts_with_all = ["domain", "robot", "preset", "methods", "world", "executor", "worker"])]
     all: bool,
     /// With --all: plays these tables (table1), runs (table1-paper) or run directories (table1-paper-D3) alone, separated by commas.
     #[arg(long, value_delimiter = ',', requires = "all")]
@@ -60,7 +61,16 @@ struct Arguments {
     /// How long a world may take for an action, s.
     #[arg(long, default_value = "60", value_parser = seconds)]
     world_act_secs: Duration,
-    /// Worker threads, each with a world of its own [default: all cores; 1 with a world behind a socket].
+    /// Who plays: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/cluster.md.
+    #[arg(long, default_value_t = Executor::Local)]
+    executor: Executor,
+    /// Tasks that slurm or hq cut the trials into.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    shards: u32,
+    /// Plays this shard alone, as the tasks of an array do; the tables are made by the command without it.
+    #[arg(long, value_name = "SHARD")]
+    worker: Option<u32>,
+    /// Worker threads, each with a world of its own [default: all cores; 1 with a world behind a socket, and in tasks of slurm or hq].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     threads: Option<u32>,
     /// Small budgets: a run of a minute or two whose figures mean nothing.
@@ -116,6 +126,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
         Some(root) => root.clone(),
         None => scenario::find_root(&std::env::current_dir()?)?,
     };
+    check_shards(arguments)?;
     match &arguments.domain {
         Some(domain) => run_one(arguments, &root, domain),
         None => run_all(arguments, &root),
@@ -130,13 +141,29 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     let out = arguments.out.clone().unwrap_or_else(|| {
         root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(evaluation.name())
     });
+    if let Some(index) = arguments.worker {
+        let run = evaluation.open_worker(&out, Shard { index, of: arguments.shards })?;
+        let interrupted = listen_for_interrupts()?;
+        let player = Player { threads: Some(arguments.threads.unwrap_or(1)), interrupted: &interrupted };
+        return player.play(&evaluation, &run).context(Failed);
+    }
+    if let Executor::Engine(engine) = arguments.executor {
+        // Before anything is written: a machine without the engine must not leave a folder behind.
+        engine.check()?;
+    }
     let run = evaluation.open(&out)?;
     if run.resumed() > 0 {
         eprintln!("{} trials are finished already", run.resumed());
     }
     let interrupted = listen_for_interrupts()?;
-    let player = Player { threads: arguments.threads, interrupted: &interrupted };
-    if !player.play(&evaluation, &run).context(Failed)? {
+    let finished = match arguments.executor {
+        Executor::Local => {
+            let player = Player { threads: arguments.threads, interrupted: &interrupted };
+            player.play(&evaluation, &run).context(Failed)?
+        }
+        Executor::Engine(engine) => submit(engine, &run, arguments, &interrupted)?,
+    };
+    if !finished {
         return Ok(false);
     }
     let table = evaluation.finish(&run).context(Failed)?;
@@ -208,6 +235,42 @@ fn request(arguments: &Arguments, root: &Path, domain: &str) -> Request {
         seed: arguments.seed,
         prior: arguments.prior.clone(),
         world: arguments.world.clone().map(|address| (address, timeouts(arguments))),
+    }
+}
+
+/// What no array can do.
+fn check_shards(arguments: &Arguments) -> Result<()> {
+    if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards) {
+        bail!("--worker: expected a shard below {}, found {shard}", arguments.shards);
+    }
+    if let (Executor::Engine(_), Some(WorldAddress::Tcp(_))) = (arguments.executor, &arguments.world) {
+        bail!(
+            "--executor {}: a world behind a socket of this machine is played in here: expected local",
+            arguments.executor
+        );
+    }
+    Ok(())
+}
+
+/// Has an engine play what is missing; false where it was interrupted.
+fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &AtomicBool) -> Result<bool> {
+    let mut finished = run.resumed();
+    let mut report = |event| match event {
+        Event::News(news) => eprintln!("{news}"),
+        Event::Looked => {
+            let now = run.trials().map_or(finished, |trials| trials.len());
+            if now > finished {
+                eprintln!("{now} trials are finished");
+            }
+            finished = now;
+        }
+    };
+    let played = run.play_on(engine, arguments.shards, arguments.threads.unwrap_or(1), interrupted, &mut report);
+    match played {
+        Ok(outcome) => Ok(outcome == Outcome::Finished),
+        // The rest is of the kind that is said before anything is played.
+        Err(error @ experiments::Error::Cluster(cluster::Error::Refused { .. })) => Err(error.into()),
+        Err(error) => Err(error).context(Failed),
     }
 }
 

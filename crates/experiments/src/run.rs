@@ -1,15 +1,16 @@
 //! Run directories: identity, finished trials, resumption.
 
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
-use std::io::Write as _;
+use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use agent::{Method, WorldIdentity};
+use cluster::Lock;
 use serde::{Deserialize, Serialize};
 
-use crate::files::{claim, file_error, pretty, write_atomically};
+use crate::files::{check_identity, claim, file_error, pretty, write_atomically};
+use crate::shards::{self, Log, Shard, Trials};
 use crate::{Error, Table, TrialRecord};
 
 /// What decides the results of a run. A folder is resumed only by the same run.
@@ -50,38 +51,95 @@ pub struct Provenance {
 pub struct Run {
     folder: PathBuf,
     provenance: Provenance,
-    log: Mutex<File>,
-    finished: BTreeMap<(Method, u32), TrialRecord>,
+    log: Mutex<Log>,
+    finished: Trials,
+    /// What is played here; everything where `None`.
+    shard: Option<Shard>,
+    /// Held by all but workers.
+    _lock: Option<Lock>,
 }
 
 impl Run {
-    /// Opens or creates `folder` for a run; reads the trials that are finished.
+    /// Opens or creates `folder` for a run and holds it; reads the trials that are finished.
     ///
     /// # Errors
     ///
-    /// A folder of another run, an unreadable record, a folder that cannot be written. Nothing is overwritten.
+    /// A folder of another run, one that another program holds, an unreadable record, a folder that cannot be written. Nothing is
+    /// overwritten.
     pub fn open(folder: &Path, provenance: Provenance, scenario_toml: &str) -> Result<Self, Error> {
         let ours = ["scenario.toml", "trials.jsonl", "table.json", "table.md", "table.csv"];
         claim(folder, "run.json", &provenance.run, &ours)?;
+        let lock = Lock::take(&folder.join("run.json"))?;
         // After the identity, so that a kill in between leaves a folder that says whose it is.
         let scenario_file = folder.join("scenario.toml");
         if !scenario_file.exists() {
             write_atomically(&scenario_file, scenario_toml.as_bytes())?;
         }
         let log_file = folder.join("trials.jsonl");
-        let finished = read_trials(&log_file)?;
+        cut_broken_line(&log_file)?;
+        let finished = read_trials(folder, &provenance)?;
         let log =
             OpenOptions::new().create(true).append(true).open(&log_file).map_err(file_error(&log_file, "opening"))?;
-        Ok(Self { folder: folder.to_path_buf(), provenance, log: Mutex::new(log), finished })
+        let log = Mutex::new(Log::Own(log_file, log));
+        Ok(Self { folder: folder.to_path_buf(), provenance, log, finished, shard: None, _lock: Some(lock) })
+    }
+
+    /// Opens the folder of a run for one of its workers, which plays a shard and leaves everything but a log of its own alone.
+    ///
+    /// # Errors
+    ///
+    /// A folder of another run or of none, an unreadable record.
+    pub fn open_worker(folder: &Path, mut provenance: Provenance, shard: Shard) -> Result<Self, Error> {
+        let file = folder.join("run.json");
+        let text = std::fs::read_to_string(&file).map_err(|source| Error::File {
+            file: file.clone(),
+            action: "reading",
+            source,
+        })?;
+        if provenance.run.commit == "unknown"
+            && let Ok(begun) = serde_json::from_str::<RunIdentity>(&text)
+        {
+            // A node without git plays what it was sent to play.
+            provenance.run.commit = begun.commit;
+        }
+        check_identity(&file, &text, &provenance.run)?;
+        let finished = read_trials(folder, &provenance)?;
+        let log = Mutex::new(Log::Attempt(folder.to_path_buf(), shard));
+        Ok(Self { folder: folder.to_path_buf(), provenance, log, finished, shard: Some(shard), _lock: None })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// All trials, methods in turn for each, with the shards that play them if there are `of`.
+    pub(crate) fn items(&self, of: u32) -> impl Iterator<Item = (Shard, (Method, u32))> {
+        let Provenance { methods, trials, .. } = &self.provenance;
+        let shard = move |trial, place| Shard::of_item(trial, place, methods.len(), of);
+        let row = move |trial| methods.iter().enumerate().map(move |(place, &m)| (shard(trial, place), (m, trial)));
+        (0..*trials).flat_map(row)
+    }
+
+    /// All trials that are finished by now, whoever played them.
+    ///
+    /// # Errors
+    ///
+    /// Where a log cannot be read, or two of them disagree.
+    pub fn trials(&self) -> Result<BTreeMap<(Method, u32), TrialRecord>, Error> {
+        let mut trials = read_trials(&self.folder, &self.provenance)?;
+        trials.retain(|(_, trial), _| *trial < self.provenance.trials);
+        Ok(trials)
     }
 
     /// Trials that are still to be played, methods in turn for each trial.
     #[must_use]
     pub fn missing(&self) -> Vec<(Method, u32)> {
-        let p = &self.provenance;
-        (0..p.trials)
-            .flat_map(|trial| p.methods.iter().map(move |method| (*method, trial)))
-            .filter(|item| !self.finished.contains_key(item))
+        let ours = |shard| self.shard.is_none_or(|mine| shard == mine);
+        self.items(self.shard.map_or(1, |shard| shard.of))
+            .filter(|(shard, item)| ours(*shard) && !self.finished.contains_key(item))
+            .map(|(_, item)| item)
             .collect()
     }
 
@@ -103,27 +161,14 @@ impl Run {
     pub fn keep(&self, record: &TrialRecord) -> Result<(), Error> {
         let mut line = serde_json::to_string(record).expect("a record is plain data");
         line.push('\n');
-        let mut log = self.log.lock().expect("no thread panics while it writes");
-        let written = log.write_all(line.as_bytes()).and_then(|()| log.sync_data());
-        written.map_err(file_error(&self.folder.join("trials.jsonl"), "writing"))
-    }
-
-    /// All trials that are finished by now.
-    ///
-    /// # Errors
-    ///
-    /// Where the file cannot be read.
-    pub fn trials(&self) -> Result<BTreeMap<(Method, u32), TrialRecord>, Error> {
-        let mut trials = read_trials(&self.folder.join("trials.jsonl"))?;
-        trials.retain(|(_, trial), _| *trial < self.provenance.trials);
-        Ok(trials)
+        self.log.lock().expect("no thread panics while it writes").append(&line)
     }
 
     /// Writes the tables from all trials, in order.
     ///
     /// # Errors
     ///
-    /// Where a file cannot be read or written.
+    /// Where a trial is missing, where a file cannot be read or written.
     ///
     /// # Panics
     ///
@@ -136,37 +181,69 @@ impl Run {
         published: &BTreeMap<String, scenario::Published>,
     ) -> Result<Table, Error> {
         let log_file = self.folder.join("trials.jsonl");
-        let trials = read_trials(&log_file)?;
+        // Of all that is there, also what was asked for earlier: no trial is thrown away.
+        let trials = read_trials(&self.folder, &self.provenance)?;
+        if let Some((_, (method, trial))) = self.items(1).find(|(_, item)| !trials.contains_key(item)) {
+            return Err(Error::MissingTrial { file: log_file, method: method.name(), trial });
+        }
         // In order of method and trial, whatever order they ended in.
         let lines: String = trials
             .values()
             .map(|record| serde_json::to_string(record).expect("a record is plain data") + "\n")
             .collect();
         write_atomically(&log_file, lines.as_bytes())?;
+        shards::remove(&self.folder)?;
         let table = Table::new(domain, robot, preset, &self.provenance, &trials, published);
         write_atomically(&self.folder.join("table.json"), pretty(&table).as_bytes())?;
         write_atomically(&self.folder.join("table.md"), table.to_markdown().as_bytes())?;
         write_atomically(&self.folder.join("table.csv"), table.to_csv().as_bytes())?;
+        whole_file::sweep(&self.folder).map_err(|e| Error::File {
+            file: e.path,
+            action: "sweeping",
+            source: e.source,
+        })?;
         Ok(table)
     }
 }
 
-/// Finished trials. A last line without its line feed is what a kill left of a write: it is dropped, and cut from the file so that the
-/// next record starts a line of its own.
-fn read_trials(file: &Path) -> Result<BTreeMap<(Method, u32), TrialRecord>, Error> {
-    let text = match std::fs::read_to_string(file) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
-        Err(e) => return Err(file_error(file, "reading")(e)),
-    };
-    let whole = text.rfind('\n').map_or(0, |at| at + 1);
+/// Finished trials of a run, its workers' among them.
+fn read_trials(folder: &Path, provenance: &Provenance) -> Result<Trials, Error> {
+    let file = folder.join("trials.jsonl");
+    let mut trials = parse_trials(&file, &read_log(&file)?)?;
+    // A world that is another program need not do the same twice.
+    shards::add(folder, &mut trials, provenance.run.world.is_none())?;
+    Ok(trials)
+}
+
+/// What is in a log; nothing where there is none.
+pub(crate) fn read_log(file: &Path) -> Result<Vec<u8>, Error> {
+    match std::fs::read(file) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+        read => read.map_err(file_error(file, "reading")),
+    }
+}
+
+/// The end of the last line that has a line feed: what follows is what a kill left of a write.
+fn whole_lines(text: &[u8]) -> usize {
+    text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1)
+}
+
+/// Cuts what a kill left of a write, so that the next record starts a line of its own. Only for who holds the folder.
+fn cut_broken_line(file: &Path) -> Result<(), Error> {
+    let text = read_log(file)?;
+    let whole = whole_lines(&text);
     if whole < text.len() {
         let cut = OpenOptions::new().write(true).open(file).and_then(|f| f.set_len(whole as u64));
         cut.map_err(file_error(file, "cutting a broken line"))?;
     }
-    let mut trials = BTreeMap::new();
-    for (index, line) in text[..whole].lines().enumerate() {
-        let record: TrialRecord = serde_json::from_str(line).map_err(|e| Error::Record {
+    Ok(())
+}
+
+/// Records of a log's whole lines; of two of one trial the first.
+pub(crate) fn parse_trials(file: &Path, text: &[u8]) -> Result<Trials, Error> {
+    let mut trials = Trials::new();
+    for (index, line) in text[..whole_lines(text)].split_inclusive(|byte| *byte == b'\n').enumerate() {
+        let record: TrialRecord = serde_json::from_slice(line).map_err(|e| Error::Record {
             file: file.to_path_buf(),
             line: index + 1,
             message: e.to_string(),
@@ -177,7 +254,7 @@ fn read_trials(file: &Path) -> Result<BTreeMap<(Method, u32), TrialRecord>, Erro
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use agent::Reason;
 
     use super::*;
@@ -199,7 +276,7 @@ mod tests {
         }
     }
 
-    fn record(method: Method, trial: u32, success: bool) -> TrialRecord {
+    pub(crate) fn record(method: Method, trial: u32, success: bool) -> TrialRecord {
         let reason = if success { Reason::Goal } else { Reason::Horizon };
         TrialRecord { method, trial, success, reason, ..crate::trial::tests::record() }
     }
@@ -291,8 +368,49 @@ mod tests {
             run.keep(&record(method, trial, true)).unwrap();
         }
         assert_eq!(finish(&run).rows[0].trials, 1);
+        let message = Run::open(folder.path(), provenance(1), "").unwrap_err().to_string();
+        assert!(message.contains("another program is at work"), "{message}");
+        drop(run);
         let run = Run::open(folder.path(), provenance(1), "").unwrap();
         assert_eq!((run.resumed(), run.missing().len()), (2, 4));
+    }
+
+    #[test]
+    fn shards_of_workers_make_the_same_files_as_a_run_without() {
+        let alone = tempfile::tempdir().unwrap();
+        let run = Run::open(alone.path(), provenance(1), "").unwrap();
+        let keep = |run: &Run, (method, trial)| run.keep(&record(method, trial, trial == 1)).unwrap();
+        run.missing().into_iter().for_each(|item| keep(&run, item));
+        finish(&run);
+
+        let folder = tempfile::tempdir().unwrap();
+        let holder = Run::open(folder.path(), provenance(1), "").unwrap();
+        for index in 0..4 {
+            let worker = || Run::open_worker(folder.path(), provenance(1), Shard { index, of: 4 }).unwrap();
+            // Two attempts at once play the same, a third has nothing to do.
+            let (first, second) = (worker(), worker());
+            first.missing().into_iter().for_each(|item| keep(&first, item));
+            second.missing().into_iter().for_each(|item| keep(&second, item));
+            assert_eq!(worker().missing(), []);
+        }
+        finish(&holder);
+        for name in ["trials.jsonl", "table.json", "table.md", "table.csv"] {
+            let read = |folder: &Path| std::fs::read_to_string(folder.join(name)).unwrap();
+            assert_eq!(read(folder.path()), read(alone.path()), "{name}");
+        }
+        assert!(!folder.path().join("shards").exists());
+        let other = Run::open_worker(folder.path(), provenance(2), Shard { index: 0, of: 4 }).unwrap_err();
+        assert!(other.to_string().contains("`seed` is 1"), "{other}");
+    }
+
+    #[test]
+    fn tables_are_not_made_of_half_a_run() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = Run::open(folder.path(), provenance(1), "").unwrap();
+        run.keep(&record(Method::NoRnn, 0, true)).unwrap();
+        let message = run.finish("D1", "sawyer", "paper", &BTreeMap::new()).unwrap_err().to_string();
+        assert!(message.contains("trial 0 of heuristic is missing"), "{message}");
+        assert!(!folder.path().join("table.json").exists());
     }
 
     #[test]
