@@ -1,7 +1,10 @@
 //! Helpers of the end-to-end suite: running the programs as a user does.
 
+pub mod slurm;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
 /// The checkout.
 #[must_use]
@@ -10,20 +13,23 @@ pub fn root() -> PathBuf {
     package.parent().unwrap_or(package).to_path_buf()
 }
 
-/// A release program, built from this checkout if need be, set to run at its root. All programs are built together, as `xtask` does.
+/// A release program, built from this checkout if need be, set to run at its root. All programs are built together, as `xtask` does, and
+/// once for all tests.
 ///
 /// # Panics
 ///
 /// If it cannot be built.
 #[must_use]
 pub fn program(binary: &str) -> Command {
+    static BUILT: OnceLock<bool> = OnceLock::new();
     let root = root();
-    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let built = Command::new(cargo)
-        .current_dir(&root)
-        .args(["build", "--release", "--quiet", "--workspace", "--bins"])
-        .status();
-    assert!(built.is_ok_and(|status| status.success()), "{binary} does not build");
+    let built = BUILT.get_or_init(|| {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let mut command = Command::new(cargo);
+        command.current_dir(&root).args(["build", "--release", "--quiet", "--workspace", "--bins"]);
+        command.status().is_ok_and(|status| status.success())
+    });
+    assert!(built, "{binary} does not build");
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     let mut command = Command::new(target.join("release").join(binary));
     command.current_dir(&root);

@@ -3,5 +3,6 @@
 mod all;
 mod architecture;
 mod bad_input;
+mod cluster;
 mod pipeline;
 mod world;

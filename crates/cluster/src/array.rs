@@ -100,37 +100,13 @@ impl Array<'_> {
             Some(_) if interrupted.load(Ordering::Relaxed) => Ok(Outcome::Interrupted),
             Some(first) => Err(Error::Unfinished {
                 executor: self.engine.name(),
-                log: last_words(&self.logs().join(format!("{job}_{first}.log"))),
+                log: last_words(&logs(self.folder).join(format!("{job}_{first}.log"))),
                 job,
                 missing: left.len(),
                 submitted: count,
             }
             .into()),
         }
-    }
-
-    /// Removes script and logs: for a folder whose shards are all there, which then looks as if the shards had been made here.
-    ///
-    /// # Errors
-    ///
-    /// Where a file cannot be removed.
-    pub fn tidy(&self) -> Result<(), Error> {
-        let logs = self.logs();
-        let Ok(entries) = std::fs::read_dir(&logs) else { return Ok(()) };
-        for entry in entries {
-            let path = entry.map_err(Error::file("list", &logs))?.path();
-            let ours = path.extension().is_some_and(|end| end == "log" || end == "sh");
-            if ours && let Err(e) = std::fs::remove_file(&path) {
-                return Err(Error::file("remove", &path)(e));
-            }
-        }
-        // It stays where somebody has put a file of his own.
-        let _ = std::fs::remove_dir(&logs);
-        Ok(())
-    }
-
-    fn logs(&self) -> PathBuf {
-        self.folder.join("cluster")
     }
 
     /// The same for the same folder, wherever the program was started.
@@ -141,7 +117,7 @@ impl Array<'_> {
     }
 
     fn submit(&self, name: &str, shards: &[u32]) -> Result<String, Error> {
-        let logs = self.logs();
+        let logs = logs(self.folder);
         std::fs::create_dir_all(&logs).map_err(Error::file("create the folder", &logs))?;
         // Workers may have another working directory until the script sets theirs.
         let logs = std::fs::canonicalize(&logs).map_err(Error::file("find", &logs))?;
@@ -192,6 +168,31 @@ impl Array<'_> {
         }
         Ok(())
     }
+}
+
+/// Removes the script and the logs that arrays have left in `folder`: for one whose shards are all there, which then looks as if they had
+/// been made here.
+///
+/// # Errors
+///
+/// Where a file cannot be removed.
+pub fn tidy(folder: &Path) -> Result<(), Error> {
+    let logs = logs(folder);
+    let Ok(entries) = std::fs::read_dir(&logs) else { return Ok(()) };
+    for entry in entries {
+        let path = entry.map_err(Error::file("list", &logs))?.path();
+        let ours = path.extension().is_some_and(|end| end == "log" || end == "sh");
+        if ours && let Err(e) = std::fs::remove_file(&path) {
+            return Err(Error::file("remove", &path)(e));
+        }
+    }
+    // It stays where somebody has put a file of his own.
+    let _ = std::fs::remove_dir(&logs);
+    Ok(())
+}
+
+fn logs(folder: &Path) -> PathBuf {
+    folder.join("cluster")
 }
 
 /// Sleeps in short pieces until `enough`.
@@ -264,18 +265,17 @@ mod tests {
     #[test]
     fn tidying_removes_what_is_ours_and_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
-        let array = Array { engine: Engine::Slurm, label: "eval", folder: folder.path(), processors: 1 };
-        array.tidy().unwrap();
-        let logs = folder.path().join("cluster");
+        tidy(folder.path()).unwrap();
+        let logs = logs(folder.path());
         std::fs::create_dir(&logs).unwrap();
         for name in ["worker.sh", "1_0.log", "1_1.log", "mine.txt"] {
             std::fs::write(logs.join(name), "x\n\n").unwrap();
         }
         assert_eq!(last_words(&logs.join("1_1.log")), format!(": {} ends with `x`", logs.join("1_1.log").display()));
-        array.tidy().unwrap();
+        tidy(folder.path()).unwrap();
         assert!(!logs.join("worker.sh").exists() && logs.join("mine.txt").exists());
         std::fs::remove_file(logs.join("mine.txt")).unwrap();
-        array.tidy().unwrap();
+        tidy(folder.path()).unwrap();
         assert!(!logs.exists());
         assert_eq!(last_words(&logs.join("1_1.log")), "");
     }

@@ -37,7 +37,7 @@ mod hq;
 mod lock;
 mod slurm;
 
-pub use array::{Array, Event, Outcome};
+pub use array::{Array, Event, Outcome, tidy};
 pub use engine::{Engine, Executor};
 pub use error::Error;
 pub use lock::Lock;

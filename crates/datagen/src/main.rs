@@ -217,8 +217,7 @@ impl Job {
             }
         };
         match array.run(|| self.missing_shards(), interrupted, &mut report) {
-            Ok(Outcome::Finished) => Ok(array.tidy()?),
-            Ok(Outcome::Interrupted) => Ok(()),
+            Ok(Outcome::Finished | Outcome::Interrupted) => Ok(()),
             Err(error) if matches!(error.downcast_ref(), Some(cluster::Error::Unfinished { .. })) => {
                 Err(error.context(Failed))
             }
@@ -253,6 +252,7 @@ impl Job {
         for folder in folders {
             whole_file::sweep(&folder)?;
         }
+        cluster::tidy(&self.out)?;
         Ok(manifest)
     }
 

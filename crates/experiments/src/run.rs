@@ -197,6 +197,7 @@ impl Run {
         write_atomically(&self.folder.join("table.json"), pretty(&table).as_bytes())?;
         write_atomically(&self.folder.join("table.md"), table.to_markdown().as_bytes())?;
         write_atomically(&self.folder.join("table.csv"), table.to_csv().as_bytes())?;
+        cluster::tidy(&self.folder)?;
         whole_file::sweep(&self.folder).map_err(|e| Error::File {
             file: e.path,
             action: "sweeping",

@@ -129,11 +129,7 @@ impl Run {
         report: &mut dyn FnMut(Event),
     ) -> Result<Outcome, Error> {
         let array = Array { engine, label: "eval", folder: self.folder(), processors };
-        let outcome = array.run(|| self.missing_shards(shards), interrupted, report)?;
-        if outcome == Outcome::Finished {
-            array.tidy()?;
-        }
-        Ok(outcome)
+        array.run(|| self.missing_shards(shards), interrupted, report)
     }
 
     /// Shards, of `of`, with trials that nobody has finished by now.
