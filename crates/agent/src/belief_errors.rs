@@ -88,6 +88,7 @@ mod tests {
         let theta = Theta {
             object: ObjectTheta { shape, mass_kg: 1.0, com_m: [0.0; 3], friction: 0.4, size_m },
             obstacle: obstacle_at.map(|_| ObstacleTheta { shape, mass_kg: 1.0, size_m: [0.05; 3] }),
+            effects: vec![],
         };
         Particle::new(state, theta)
     }

@@ -5,6 +5,7 @@
 
 mod agent;
 mod belief_errors;
+mod births;
 mod error;
 mod external;
 mod method;

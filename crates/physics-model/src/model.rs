@@ -12,8 +12,8 @@ use crate::effect::{Effect, EffectConfig, Hooks, Memory, Nominal, ToolMoment, si
 use crate::error::Impossible;
 use crate::feasible::{check_overlaps, check_theta};
 use crate::force::{ForceSensor, resting_reading};
-use crate::model_error;
 use crate::loads::Effects;
+use crate::model_error;
 use crate::motion::JointPath;
 use crate::perturb;
 use crate::reward::Events;

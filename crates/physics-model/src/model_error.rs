@@ -27,8 +27,8 @@ pub(crate) fn corrected(
         let gain = (error / total).powi(2);
         gain * difference + z * error * noise / total
     };
-    for axis in 0..2 {
-        object.position_m[axis] += draw(measured_m[axis] - object.position_m[axis], error.position_m, noise.position_m);
+    for (simulated, measured) in object.position_m[..2].iter_mut().zip(measured_m) {
+        *simulated += draw(measured - *simulated, error.position_m, noise.position_m);
     }
     let turn = unit(measured) * unit(object.orientation).inverse();
     let yaw_rad = draw(turn.scaled_axis().z, error.yaw_rad, noise.orientation_rad);
@@ -66,7 +66,7 @@ mod tests {
         };
         let state =
             State { joints_rad: vec![0.0; 7], object: BodyState::at_rest([0.5, 0.1, 0.04], 0.3), obstacle: None };
-        Particle::new(state, Theta { object, obstacle: None })
+        Particle::new(state, Theta { object, obstacle: None, effects: vec![] })
     }
 
     /// 4 mm and 0.02 rad beside the simulation.

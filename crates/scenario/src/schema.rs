@@ -144,6 +144,8 @@ pub struct InitialBeliefConfig {
 pub struct AgentConfig {
     /// Draws from the learned prior after each action.
     pub proposals: usize,
+    /// Share of the belief that is drawn anew from the prior before each update; 0 as published.
+    pub birth_share: f64,
     /// Default policy of the search's simulations.
     pub rollouts: Rollouts,
 }
@@ -361,6 +363,7 @@ impl Scenario {
                 let name = self.distribution.effects.keys().find(unlisted)?.name();
                 Some(format!("distribution.effects.{name}: expected {name} in effects.truth or effects.model"))
             })
+            .or_else(|| check(share(self.agent.birth_share), "agent.birth_share", "0 to 1", &self.agent.birth_share))
             .or_else(|| check(share(d.movable_share), "data.movable_share", "0 to 1", &d.movable_share))
             .or_else(|| check(share(d.goal_share), "data.goal_share", "0 to 1", &d.goal_share))
             .or_else(|| check(share(d.exploration_share), "data.exploration_share", "0 to 1", &d.exploration_share))
