@@ -11,7 +11,8 @@ use crate::error::Problem;
 use crate::header::{Header, Noise, Object, Robot, Shape, SplitConfig, Table};
 use crate::{Error, Number, VERSION};
 
-/// Comments for `log.toml` by dotted key, such as `object.mass_kg`: where a number is from. The key "" stands for the head of the file.
+/// Comments for `log.toml` by dotted key, such as `object.mass_kg`: where a number is from. The key "" stands for the head of the file,
+/// `object.[]` for the table `[object]`.
 pub type Notes = BTreeMap<&'static str, String>;
 
 #[derive(Deserialize)]
@@ -162,10 +163,12 @@ pub(crate) fn print(header: &Header, notes: &Notes) -> String {
     let mut text = String::new();
     comment(&mut text, notes, "");
     let mut line = |key: &str, value: String| {
-        comment(&mut text, notes, key);
         if let Some(table) = key.strip_suffix(".[]") {
-            let _ = write!(text, "\n[{table}]\n");
+            text.push('\n');
+            comment(&mut text, notes, key);
+            let _ = writeln!(text, "[{table}]");
         } else {
+            comment(&mut text, notes, key);
             let name = key.rsplit('.').next().unwrap_or(key);
             let _ = writeln!(text, "{name} = {value}");
         }

@@ -1,4 +1,4 @@
-//! Logs of real or simulated rigs: read, checked, written.
+//! Logs of real or simulated rigs: read, checked, written, imported.
 //!
 //! ```text
 //! DIR/log.toml           the rig and the nominal model: Header
@@ -57,6 +57,7 @@ mod error;
 mod folder;
 mod header;
 mod header_toml;
+pub mod import;
 mod log;
 mod number;
 mod outline;

@@ -28,6 +28,9 @@ enum Verb {
     /// Plays trials of methods on a domain and prints the table.
     #[command(disable_help_flag = true)]
     Eval(Rest),
+    /// Turns published measurements into a log that can be diagnosed.
+    #[command(disable_help_flag = true)]
+    ImportLog(Rest),
     /// Times the parts and checks their accuracy, beside peers where those are installed.
     #[command(disable_help_flag = true)]
     Bench(Rest),
@@ -48,6 +51,7 @@ fn main() -> ExitCode {
         Verb::Train(rest) => program("train", &rest.arguments),
         Verb::Calibrate(rest) => program("calibrate", &rest.arguments),
         Verb::Eval(rest) => program("eval", &rest.arguments),
+        Verb::ImportLog(rest) => program("import-log", &rest.arguments),
         Verb::Bench(rest) => program("bench", &rest.arguments),
         Verb::Ci => ci(),
     };

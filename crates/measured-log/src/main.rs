@@ -1,0 +1,78 @@
+//! `cargo xtask import-log`: published measurements of others as logs.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use measured_log::{Episode, Error, Format, Log, Notes, import};
+
+/// Turns published measurements into a log that `cargo xtask diagnose --measured` reads; see docs/measured-log.md.
+#[derive(Debug, Parser)]
+#[command(name = "import-log", version)]
+struct Arguments {
+    #[command(subcommand)]
+    source: Source,
+}
+
+#[derive(Debug, Subcommand)]
+enum Source {
+    /// Tosses of a cube (ContactNets): a CSV file, or a folder with one tosses_*.csv.
+    Contactnets {
+        /// The file or folder.
+        source: PathBuf,
+        #[command(flatten)]
+        target: Target,
+    },
+    /// Pushes of a triangle (MLab_EXP): one text file, plain or gzip, named or in a folder named after the feet.
+    CmuPush {
+        /// The file.
+        source: PathBuf,
+        /// Force of friction between triangle and board, N: 4.2 on the hard, 5.0 on the wooden board.
+        #[arg(long, value_name = "NEWTONS", default_value_t = import::HARD_BOARD_N)]
+        friction_force: f64,
+        #[command(flatten)]
+        target: Target,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+struct Target {
+    /// Folder of the log, without one so far.
+    #[arg(long)]
+    out: PathBuf,
+    /// Format of the samples.
+    #[arg(long, value_enum, default_value_t = Samples::Csv)]
+    format: Samples,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Samples {
+    Csv,
+    Parquet,
+}
+
+fn main() -> ExitCode {
+    let (imported, target) = match Arguments::parse().source {
+        Source::Contactnets { source, target } => (import::contactnets(&source), target),
+        Source::CmuPush { source, friction_force, target } => (import::cmu_push(&source, friction_force), target),
+    };
+    match imported.and_then(|(log, notes)| write(&target, &log, &notes)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            // 2 is bad input; a disk that refuses is a failure.
+            if let Error::Write { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
+        }
+    }
+}
+
+fn write(target: &Target, log: &Log, notes: &Notes) -> Result<(), Error> {
+    let format = match target.format {
+        Samples::Csv => Format::Csv,
+        Samples::Parquet => Format::Parquet,
+    };
+    measured_log::write(&target.out, log, format, notes)?;
+    let rows: usize = log.episodes.iter().map(Episode::rows).sum();
+    println!("{}: {} episodes, {rows} rows", target.out.display(), log.episodes.len());
+    Ok(())
+}
