@@ -104,13 +104,17 @@ start() {
         --log-file="$dir/munged.log" --seed-file="$dir/munged.seed"
     running slurmctld || daemon slurmctld -f "$SLURM_CONF"
     running slurmd || daemon slurmd -f "$SLURM_CONF" -N one
-    for _ in $(seq 100); do
-        case $(timeout 5 sinfo --noheader --format=%T 2>/dev/null) in
-        idle* | mixed | allocated) exit 0 ;;
+    # A node whose tasks were killed is "completing" for a while, and a busy machine takes its time.
+    local state=unknown
+    for _ in $(seq 300); do
+        state=$(timeout 5 sinfo --noheader --format=%T 2>/dev/null || true)
+        case $state in
+        idle* | mixed* | allocated* | completing*) exit 0 ;;
         esac
         sleep 0.2
     done
-    echo "the node did not come up: see $dir/slurmctld.log and $dir/slurmd.log" >&2
+    echo "the node did not come up, its state is '$state': see $dir/slurmctld.log and $dir/slurmd.log" >&2
+    tail -n 20 "$dir/slurmctld.log" "$dir/slurmd.log" >&2 || true
     exit 1
 }
 
