@@ -159,18 +159,10 @@ impl<'a> Agent<'a> {
         streams: &mut Streams,
     ) -> Result<Option<Mind<'m>>, Error> {
         let Context { model, observation, .. } = *context;
-        let mind = self.renew(mind, model, streams)?;
-        let mut proposals = match &mut self.prior {
-            Some(prior) => {
-                prior.suggest(Some(&record.action), observation);
-                let count = self.problem.scenario.agent.proposals;
-                suggest(prior, self.method, context, count, &mut streams.suggestion)
-            }
-            None => Vec::new(),
-        };
         Ok(Some(match mind {
             Mind::Belief(mut search, particles, mut filter) => {
-                complete_effects(self.problem, &particles, &mut proposals, &mut streams.suggestion);
+                let rng = &mut streams.suggestion;
+                let (particles, proposals) = self.suggestions(particles, &record.action, context, rng)?;
                 let mobility = model.config().world.obstacle_mobility;
                 let prior = self.prior.as_ref();
                 let unknown = &self.problem.beliefs.effects;
@@ -205,15 +197,21 @@ impl<'a> Agent<'a> {
         }))
     }
 
-    /// The belief before the action with what only the network knows of.
-    fn renew<'m>(&self, mind: Mind<'m>, model: &PushModel, streams: &mut Streams) -> Result<Mind<'m>, Error> {
-        let share = self.problem.scenario.agent.birth_share;
-        Ok(match (mind, &self.prior) {
-            (Mind::Belief(search, particles, filter), Some(prior)) if share > 0.0 => {
-                Mind::Belief(search, with_births(model, prior, particles, share, &mut streams.suggestion)?, filter)
-            }
-            (mind, _) => mind,
-        })
+    /// The belief before `action` with the network's births, and the network's suggestions after it; none without a network.
+    fn suggestions(
+        &mut self,
+        belief: Particles<Particle>,
+        action: &Action,
+        context: &Context<'_>,
+        rng: &mut Rng,
+    ) -> Result<(Particles<Particle>, Vec<Particle>), Error> {
+        let Some(prior) = &mut self.prior else { return Ok((belief, Vec::new())) };
+        let config = &self.problem.scenario.agent;
+        let belief = with_births(context.model, prior, belief, config.birth_share, rng)?;
+        prior.suggest(Some(action), context.observation);
+        let mut proposals = suggest(prior, self.method, context, config.proposals, rng);
+        complete_effects(self.problem, &belief, &mut proposals, rng);
+        Ok((belief, proposals))
     }
 
     fn first_mind(&self, observation: &Observation, seed: Seed) -> Result<Mind<'a>, Error> {

@@ -44,17 +44,9 @@ mod tests {
     use pomdp::{Purpose, Seed};
 
     use super::*;
+    use crate::sensor::tests::NOISE;
     use crate::state::State;
     use crate::theta::{ObjectShape, ObjectTheta, Theta};
-
-    const NOISE: NoiseConfig = NoiseConfig {
-        joint_rad: 0.001,
-        force_n: 0.5,
-        torque_nm: 0.05,
-        joint_torque_nm: 0.1,
-        position_m: 0.002,
-        orientation_rad: 0.01,
-    };
 
     fn simulated() -> Particle {
         let object = ObjectTheta {

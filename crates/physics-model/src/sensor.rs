@@ -212,25 +212,24 @@ pub(crate) fn unit([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use pomdp::{Purpose, Seed};
 
     use super::*;
     use crate::config::NoiseConfig;
 
+    /// The arms' noise.
+    pub(crate) const NOISE: NoiseConfig = NoiseConfig {
+        joint_rad: 0.001,
+        force_n: 0.5,
+        torque_nm: 0.05,
+        joint_torque_nm: 0.1,
+        position_m: 0.002,
+        orientation_rad: 0.01,
+    };
+
     fn sensor(force: ForceSensing) -> SensorConfig {
-        SensorConfig {
-            force,
-            large_force_limit: 100.0,
-            noise: NoiseConfig {
-                joint_rad: 0.001,
-                force_n: 0.5,
-                torque_nm: 0.05,
-                joint_torque_nm: 0.1,
-                position_m: 0.002,
-                orientation_rad: 0.01,
-            },
-        }
+        SensorConfig { force, large_force_limit: 100.0, noise: NOISE }
     }
 
     fn readings(joints: usize) -> Readings {
