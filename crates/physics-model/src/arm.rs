@@ -9,7 +9,7 @@
 //! Gravity does not act on the links: the controllers of both arms compensate it, and what the compensation misses is not modelled.
 //! The links up to the hand cannot be touched.
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion};
 use rapier3d::prelude::{
     GenericJointBuilder, JointAxesMask, MassProperties, Multibody, MultibodyJointHandle, PhysicsWorld, Pose,
     RigidBodyBuilder, RigidBodyHandle, RigidBodyType,
@@ -19,7 +19,7 @@ use crate::config::ServoConfig;
 use crate::effect::Hooks;
 use crate::loads::Effects;
 use crate::robot::{ArmBody, JointVector, Robot};
-use crate::world::{pose, vector};
+use crate::world::pose;
 
 /// Marks a link, in rapier's user data: its apparent inertia is not that of its rigid body alone.
 pub(crate) const LINK: u128 = 1;
@@ -163,20 +163,7 @@ fn isometry(pose_m: &Isometry3<f64>) -> Pose {
 }
 
 fn mass_properties(body: &ArmBody) -> MassProperties {
-    // Diagonalised in double precision.
-    let eigen = body.moment_kgm2.symmetric_eigen();
-    let mut axes = eigen.eigenvectors;
-    if axes.determinant() < 0.0 {
-        axes.column_mut(2).neg_mut();
-    }
-    let turn = UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(axes));
-    let moments: Vector3<f64> = eigen.eigenvalues;
-    MassProperties::with_principal_inertia_frame(
-        vector(body.com_m.into()),
-        body.mass_kg as f32,
-        vector(moments.into()),
-        pose([0.0; 3], [turn.i, turn.j, turn.k, turn.w]).rotation,
-    )
+    crate::bodies::mass_properties(body.com_m.into(), body.mass_kg, &body.moment_kgm2)
 }
 
 #[cfg(test)]
@@ -185,6 +172,7 @@ mod tests {
 
     use super::*;
     use crate::robot::RobotConfig;
+    use crate::world::vector;
 
     fn load(name: &str) -> Robot {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap();

@@ -1,5 +1,8 @@
 //! Bodies of a world: what they are made of, and the shapes that the engine knows them by.
 
+use std::sync::Arc;
+
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
     ActiveCollisionTypes, ActiveHooks, Ball, CoefficientCombineRule, ColliderBuilder, ColliderHandle, Cuboid, Cylinder,
     Group, InteractionGroups, InteractionTestMode, MassProperties, PhysicsWorld, RigidBody, RigidBodyBuilder,
@@ -8,12 +11,13 @@ use rapier3d::prelude::{
 
 use crate::config::WorldConfig;
 use crate::effect::{BodyRole, HiddenBody};
+use crate::prism::Prism;
 use crate::state::BodyState;
 use crate::theta::{ObjectShape, ObstacleTheta, Theta};
 use crate::world::{pose, vector};
 
 /// How far, m, the sole of a body on support points hangs above their ends.
-const SOLE_GAP_M: f64 = 0.0003;
+pub(crate) const SOLE_GAP_M: f64 = 0.0003;
 /// Radius, m, of a support point.
 const SUPPORT_RADIUS_M: f64 = 0.002;
 /// Collision groups of the table and of support points, which touch nothing else.
@@ -28,6 +32,8 @@ pub(crate) struct Body {
     pub(crate) spec: BodySpec,
     pub(crate) half_height_m: f64,
     pub(crate) dynamic: bool,
+    /// Whether it stands on points and not on its sole.
+    pub(crate) on_supports: bool,
 }
 
 /// What a body is made of.
@@ -39,10 +45,22 @@ pub(crate) struct BodySpec {
     pub(crate) friction: f64,
     /// Where it bears on the table (see [`crate::effect::Nominal::support_share`]).
     pub(crate) support_share: Option<f64>,
+    pub(crate) beyond: Beyond,
+}
+
+/// What Θ cannot say of an object: the things of measured logs. Nothing of it by default.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Beyond {
+    /// What the shape is instead of that of Θ, which is a box around it.
+    pub(crate) prism: Option<Arc<Prism>>,
+    /// Inertia about the centre of mass along the object's axes, kg m²; `None`: that of a uniform solid.
+    pub(crate) inertia_kgm2: Option<[f64; 3]>,
+    /// Point mass at the centre of the shape, kg. It does not leak.
+    pub(crate) added_mass_kg: f64,
 }
 
 impl BodySpec {
-    pub(crate) fn object(theta: &Theta, support_share: Option<f64>) -> Self {
+    pub(crate) fn object(theta: &Theta, support_share: Option<f64>, beyond: Beyond) -> Self {
         let o = &theta.object;
         // A sphere bears on one point anyway.
         let support_share = support_share.filter(|_| o.shape != ObjectShape::Sphere);
@@ -53,6 +71,7 @@ impl BodySpec {
             com_m: o.com_m,
             friction: o.friction,
             support_share,
+            beyond,
         }
     }
 
@@ -64,6 +83,7 @@ impl BodySpec {
             com_m: [0.0; 3],
             friction: config.obstacle_friction,
             support_share: None,
+            beyond: Beyond::default(),
         }
     }
 
@@ -75,6 +95,7 @@ impl BodySpec {
             com_m: [0.0; 3],
             friction: config.obstacle_friction,
             support_share: None,
+            beyond: Beyond::default(),
         }
     }
 
@@ -92,13 +113,47 @@ impl BodySpec {
         }
     }
 
+    /// Mass, kg, with what is added, when the body has the share `share` of its own left.
+    pub(crate) fn total_mass_kg(&self, share: f64) -> f64 {
+        self.mass_kg * share + self.beyond.added_mass_kg
+    }
+
+    /// Centre of mass, m, from the centre of the shape, likewise.
+    fn total_com_m(&self, share: f64) -> [f64; 3] {
+        if self.beyond.added_mass_kg == 0.0 {
+            return self.com_m;
+        }
+        self.com_m.map(|com| com * self.mass_kg * share / self.total_mass_kg(share))
+    }
+
     /// Mass properties of the share `share` of its mass.
     fn mass_properties(&self, share: f64) -> MassProperties {
-        MassProperties::new(
-            vector(self.com_m),
-            (self.mass_kg * share) as f32,
-            vector(self.inertia_kgm2().map(|v| v * share)),
-        )
+        let added_kg = self.beyond.added_mass_kg;
+        let principal = match (self.beyond.inertia_kgm2, &self.beyond.prism) {
+            (Some(inertia), _) => Some(inertia),
+            (None, None) => Some(self.inertia_kgm2()),
+            // Its axes need not be the principal ones.
+            (None, Some(_)) => None,
+        };
+        match principal {
+            Some(inertia) if added_kg == 0.0 => MassProperties::new(
+                vector(self.com_m),
+                (self.mass_kg * share) as f32,
+                vector(inertia.map(|v| v * share)),
+            ),
+            principal => {
+                let own = match (principal, &self.beyond.prism) {
+                    (None, Some(prism)) => prism.inertia_kgm2(self.mass_kg * share),
+                    (principal, _) => Matrix3::from_diagonal(&Vector3::from(principal.unwrap_or_default())) * share,
+                };
+                // Parallel axes: a point mass at distance d from the body's centre of mass adds the reduced mass times d².
+                let total_kg = self.total_mass_kg(share);
+                let d = Vector3::from(self.com_m);
+                let turned = Matrix3::identity() * d.norm_squared() - d * d.transpose();
+                let moment = own + turned * (self.mass_kg * share * added_kg / total_kg);
+                mass_properties(self.total_com_m(share), total_kg, &moment)
+            }
+        }
     }
 
     /// Leaves a body the share `share` of its mass.
@@ -106,12 +161,16 @@ impl BodySpec {
         rigid.set_additional_mass_properties(self.mass_properties(share), true);
     }
 
-    /// Where the support points are, m, from the centre of the shape.
-    fn support_points_m(&self, share: f64) -> [[f64; 2]; 4] {
+    /// Where the support points are, m, from the centre of the shape; none where it stands on its sole.
+    fn support_points_m(&self) -> Vec<[f64; 2]> {
+        if let Some(prism) = &self.beyond.prism {
+            return prism.support_points_m(self.support_share);
+        }
+        let Some(share) = self.support_share else { return Vec::new() };
         let [a, b, _] = self.shape.half_extents_m(self.size_m).map(|half| share * half);
         match self.shape {
-            ObjectShape::Box => [[a, b], [a, -b], [-a, b], [-a, -b]],
-            ObjectShape::Cylinder | ObjectShape::Sphere => [[a, 0.0], [-a, 0.0], [0.0, a], [0.0, -a]],
+            ObjectShape::Box => vec![[a, b], [a, -b], [-a, b], [-a, -b]],
+            ObjectShape::Cylinder | ObjectShape::Sphere => vec![[a, 0.0], [-a, 0.0], [0.0, a], [0.0, -a]],
         }
     }
 }
@@ -127,7 +186,7 @@ pub(crate) fn insert_body(
     let pose = pose(state.position_m, state.orientation);
     let mut builder = if movable {
         let angular = vector(state.angular_rps);
-        let arm = pose.transform_vector(vector(spec.com_m));
+        let arm = pose.transform_vector(vector(spec.total_com_m(1.0)));
         RigidBodyBuilder::dynamic()
             .linvel(vector(state.linear_mps) + angular.cross(arm))
             .angvel(angular)
@@ -136,7 +195,8 @@ pub(crate) fn insert_body(
         RigidBodyBuilder::fixed()
     };
     builder = builder.pose(pose).additional_mass_properties(spec.mass_properties(1.0));
-    let mut collider = main_collider(&spec);
+    let supports_m = spec.support_points_m();
+    let mut collider = main_collider(&spec, !supports_m.is_empty());
     if !movable {
         // A kinematic tool and a fixed body do not move each other, but the arm feels it (see `contact`).
         collider =
@@ -144,21 +204,23 @@ pub(crate) fn insert_body(
     }
     let (handle, collider) = physics.insert(builder, material(collider, spec.friction, config));
     let half_height_m = spec.shape.half_height_m(spec.size_m);
-    if let Some(share) = spec.support_share {
-        for [x, y] in spec.support_points_m(share) {
-            let end = ColliderBuilder::ball(SUPPORT_RADIUS_M as f32)
-                .translation(vector([x, y, SUPPORT_RADIUS_M - half_height_m]))
-                .density(0.0)
-                .collision_groups(InteractionGroups::new(SUPPORT, TABLE, InteractionTestMode::And));
-            physics.insert_collider(material(end, spec.friction, config), Some(handle));
-        }
+    let on_supports = !supports_m.is_empty();
+    for [x, y] in supports_m {
+        let end = ColliderBuilder::ball(SUPPORT_RADIUS_M as f32)
+            .translation(vector([x, y, SUPPORT_RADIUS_M - half_height_m]))
+            .density(0.0)
+            .collision_groups(InteractionGroups::new(SUPPORT, TABLE, InteractionTestMode::And));
+        physics.insert_collider(material(end, spec.friction, config), Some(handle));
     }
-    Body { role, handle, collider, spec, half_height_m, dynamic: movable }
+    Body { role, handle, collider, spec, half_height_m, dynamic: movable, on_supports }
 }
 
-fn main_collider(spec: &BodySpec) -> ColliderBuilder {
+fn main_collider(spec: &BodySpec, on_supports: bool) -> ColliderBuilder {
+    if let Some(prism) = &spec.beyond.prism {
+        return ColliderBuilder::new(prism.shape(on_supports)).density(0.0);
+    }
     let (mut size_m, mut shift) = (spec.size_m, Vector::ZERO);
-    if spec.support_share.is_some() {
+    if on_supports {
         let height = if spec.shape == ObjectShape::Box { &mut size_m[2] } else { &mut size_m[1] };
         *height -= SOLE_GAP_M;
         shift.z = (0.5 * SOLE_GAP_M) as f32;
@@ -204,4 +266,21 @@ pub(crate) fn shape_axis_angle(shape: ObjectShape) -> Vector {
         ObjectShape::Cylinder => Vector::new(std::f32::consts::FRAC_PI_2, 0.0, 0.0),
         ObjectShape::Box | ObjectShape::Sphere => Vector::ZERO,
     }
+}
+
+/// Of a mass whose `moment_kgm2` is about its centre of mass, axes of the body; diagonalised in double precision.
+pub(crate) fn mass_properties(com_m: [f64; 3], mass_kg: f64, moment_kgm2: &Matrix3<f64>) -> MassProperties {
+    let eigen = moment_kgm2.symmetric_eigen();
+    let mut axes = eigen.eigenvectors;
+    if axes.determinant() < 0.0 {
+        axes.column_mut(2).neg_mut();
+    }
+    let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    let moments: Vector3<f64> = eigen.eigenvalues;
+    MassProperties::with_principal_inertia_frame(
+        vector(com_m),
+        mass_kg as f32,
+        vector(moments.into()),
+        pose([0.0; 3], [turn.i, turn.j, turn.k, turn.w]).rotation,
+    )
 }

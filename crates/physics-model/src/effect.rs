@@ -17,7 +17,7 @@
 //! Worlds and signal chains live for one action. Between actions the arm stands still and signals settle: a low-pass filter starts at
 //! its first reading, a delay line at its first value, a compliant arm unloaded where it stands. [`Memory`] keeps the rest: the time since
 //! the episode began, how far the play of each joint is taken up, by how much the pose that was read lags behind, and the hidden bodies. A
-//! program that replays a log tick by tick keeps its chains for a whole episode instead.
+//! run of a [`crate::rig`], tick by tick, keeps its chains for a whole episode instead.
 
 pub mod catalogue;
 pub mod memory;

@@ -7,7 +7,7 @@ use crate::effect::signal::ForceChain;
 use crate::effect::{Hooks, ToolMoment};
 use crate::loads::Effects;
 use crate::motion::{JointMoment, JointPath};
-use crate::robot::Robot;
+use crate::robot::{JointVector, Robot};
 use crate::world::Wrench;
 
 /// Sensor of one action.
@@ -82,8 +82,8 @@ impl<'a> ForceSensor<'a> {
             }
             Some(moment) => {
                 let torques = joint_torques(self.robot, self.effects, moment, &read);
-                for (sum, torque) in self.torques_nm.iter_mut().zip(torques) {
-                    *sum += torque;
+                for (sum, torque) in self.torques_nm.iter_mut().zip(&torques) {
+                    *sum += *torque;
                 }
                 touched && torques.iter().any(|torque| torque.abs() > self.config.large_force_limit)
             }
@@ -134,7 +134,7 @@ fn wrist_reading(robot: &Robot, joints_rad: &[f64], wrench: &Wrench) -> [f64; 6]
 }
 
 /// Torques that the motors give, N·m: M(q) q̈ + C(q, q̇) q̇ + g(q) − Jᵀw, and what effects add; unused places are 0.
-fn joint_torques(robot: &Robot, effects: Effects, moment: &JointMoment, wrench: &Wrench) -> [f64; 6] {
+pub(crate) fn joint_torques(robot: &Robot, effects: Effects, moment: &JointMoment, wrench: &Wrench) -> JointVector {
     let q = moment.position_rad();
     let mut motion = robot.inverse_dynamics(q, moment.rate_rps(), moment.acceleration_rps2());
     if effects.hooks.contains(Hooks::JOINT_FRICTION) {
@@ -142,12 +142,8 @@ fn joint_torques(robot: &Robot, effects: Effects, moment: &JointMoment, wrench: 
             effect.joint_friction(moment.rate_rps(), &mut motion);
         }
     }
-    let mut torques = [0.0; 6];
     let [fx, fy, fz] = wrench.force_n;
     let [tx, ty, tz] = wrench.torque_nm;
     let contact = robot.contact_torque(q, &Vector6::new(fx, fy, fz, tx, ty, tz));
-    for (j, torque) in torques.iter_mut().enumerate().take(q.len()) {
-        *torque = motion[j] - contact[j];
-    }
-    torques
+    motion - contact
 }

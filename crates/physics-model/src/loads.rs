@@ -47,7 +47,7 @@ impl<'a> Effects<'a> {
         let height = f64::from(rigid.translation().z) - config.table_height_m;
         let view = BodyView {
             role: body.role,
-            mass_kg: body.spec.mass_kg * share,
+            mass_kg: body.spec.total_mass_kg(share),
             friction: body.spec.friction,
             rolling_radius_m: (body.spec.shape == ObjectShape::Sphere).then_some(body.spec.size_m[0]),
             on_table: height < body.half_height_m + ON_TABLE_M,
@@ -110,21 +110,45 @@ fn nearest(
     Some((contact.dist, contact.point1, contact.point2, contact.normal1))
 }
 
-/// Hook of a world whose effects change the friction with the table.
-pub(crate) struct TableFriction<'a> {
+/// Hook of a world whose contacts have other friction than their materials.
+pub(crate) struct ContactFriction<'a> {
     pub(crate) effects: Effects<'a>,
     pub(crate) table: ColliderHandle,
+    pub(crate) pair: Option<PairFriction>,
 }
 
-impl PhysicsHooks for TableFriction<'_> {
+/// Friction coefficient of two bodies that their materials do not decide.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PairFriction {
+    pub(crate) bodies: [RigidBodyHandle; 2],
+    pub(crate) coefficient: f32,
+}
+
+impl PairFriction {
+    fn set(&self, context: &mut ContactModificationContext) {
+        let [a, b] = self.bodies;
+        let found = [context.rigid_body1, context.rigid_body2];
+        if (found == [Some(a), Some(b)] || found == [Some(b), Some(a)])
+            && let Some(manifold) = context.rigid_mut()
+        {
+            *manifold.friction = self.coefficient;
+        }
+    }
+}
+
+impl PhysicsHooks for ContactFriction<'_> {
     fn modify_solver_contacts(&self, context: &mut ContactModificationContext) {
+        if let Some(pair) = &self.pair {
+            pair.set(context);
+        }
         let body = match self.table {
             table if table == context.collider1 => context.rigid_body2,
             table if table == context.collider2 => context.rigid_body1,
             _ => None,
         };
         let body = body.and_then(|handle| context.bodies.get(handle)).filter(|body| body.is_dynamic());
-        if let Some(body) = body
+        if self.effects.hooks.contains(Hooks::FRICTION)
+            && let Some(body) = body
             && let Some(manifold) = context.rigid_mut()
             && !manifold.solver_contacts.is_empty()
         {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng, Step};
 use serde::{Deserialize, Serialize};
 
@@ -79,9 +79,7 @@ impl PushModel {
     #[must_use]
     pub fn new(config: PushConfig, robot: Arc<Robot>) -> Self {
         let effects: Arc<Vec<Box<dyn Effect>>> = Arc::new(config.effects.iter().map(EffectConfig::build).collect());
-        let r = robot.tool_rotation();
-        let rotation = Matrix3::from_fn(|row, column| r[row][column]);
-        let tool_orientation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+        let tool_orientation = robot.tool_orientation();
         Self { config, robot, effects, tool_orientation }
     }
 

@@ -1,4 +1,4 @@
-//! The joints' way through one action.
+//! The joints' way through one action, and what derives from positions one a control step.
 
 use crate::action::{minimum_jerk, minimum_jerk_acceleration, minimum_jerk_rate};
 use crate::state::MAX_JOINTS;
@@ -75,6 +75,11 @@ impl JointPath {
 }
 
 impl JointMoment {
+    /// At rest at `position_rad`.
+    pub(crate) fn resting(position_rad: &[f64]) -> Self {
+        JointPath::resting(position_rad).stopped(0.0)
+    }
+
     pub(crate) fn position_rad(&self) -> &[f64] {
         &self.position[..self.count]
     }
@@ -97,6 +102,31 @@ impl JointMoment {
 
     pub(crate) fn acceleration_rps2(&self) -> &[f64] {
         &self.acceleration[..self.count]
+    }
+}
+
+/// The tool's acceleration from its places, one a control step, from rest.
+pub(crate) struct ToolMotion {
+    position_m: [f64; 3],
+    velocity_mps: [f64; 3],
+    period_secs: f64,
+}
+
+impl ToolMotion {
+    pub(crate) fn new(position_m: [f64; 3], period_secs: f64) -> Self {
+        Self { position_m, velocity_mps: [0.0; 3], period_secs }
+    }
+
+    pub(crate) fn acceleration(&mut self, position_m: [f64; 3]) -> [f64; 3] {
+        let velocity: [f64; 3] = std::array::from_fn(|i| (position_m[i] - self.position_m[i]) / self.period_secs);
+        let acceleration = std::array::from_fn(|i| (velocity[i] - self.velocity_mps[i]) / self.period_secs);
+        (self.position_m, self.velocity_mps) = (position_m, velocity);
+        acceleration
+    }
+
+    /// The same motion seen at `position_m`.
+    pub(crate) fn shift_to(&mut self, position_m: [f64; 3]) {
+        self.position_m = position_m;
     }
 }
 

@@ -9,7 +9,7 @@ use crate::feasible::{check_overlaps, nothing_happens, parts_in_reach};
 use crate::force::ForceSensor;
 use crate::loads::Effects;
 use crate::model::{ActionReport, Particle, PushModel};
-use crate::motion::{JointMoment, JointPath};
+use crate::motion::{JointMoment, JointPath, ToolMotion};
 use crate::state::{BodyState, MAX_JOINTS};
 use crate::theta::Theta;
 use crate::world::{Divergence, ToolPose, World, Wrench};
@@ -327,25 +327,5 @@ impl<'a> Simulation<'a> {
             acceleration_mps2: motion.acceleration(position_m),
             gravity_mps2: self.config.gravity_mps2,
         }
-    }
-}
-
-/// The tool's acceleration from its places, one a control step, from rest.
-struct ToolMotion {
-    position_m: [f64; 3],
-    velocity_mps: [f64; 3],
-    period_secs: f64,
-}
-
-impl ToolMotion {
-    fn new(position_m: [f64; 3], period_secs: f64) -> Self {
-        Self { position_m, velocity_mps: [0.0; 3], period_secs }
-    }
-
-    fn acceleration(&mut self, position_m: [f64; 3]) -> [f64; 3] {
-        let velocity: [f64; 3] = std::array::from_fn(|i| (position_m[i] - self.position_m[i]) / self.period_secs);
-        let acceleration = std::array::from_fn(|i| (velocity[i] - self.velocity_mps[i]) / self.period_secs);
-        (self.position_m, self.velocity_mps) = (position_m, velocity);
-        acceleration
     }
 }

@@ -41,6 +41,11 @@ impl ToolSpring {
         Self { stiffness_npm, damping_nspm, period_secs, rest, rest_mps: Vector::ZERO }
     }
 
+    /// The same with its slack end at `position_m`: the tool hangs deflected.
+    pub(crate) fn rest_at(&mut self, position_m: [f64; 3]) {
+        self.rest = vector(position_m);
+    }
+
     /// Commands that the tool, were it free, be at `position_m` at the end of the coming control step.
     pub(crate) fn command(&mut self, physics: &mut PhysicsWorld, tool: RigidBodyHandle, position_m: [f64; 3]) {
         let rigid = &mut physics.bodies[tool];

@@ -13,21 +13,33 @@ use rapier3d::prelude::{
 use serde::{Deserialize, Serialize};
 
 use crate::arm::Arm;
-use crate::bodies::{Body, BodySpec, insert_body, material, separate_supports};
+use crate::bodies::{Beyond, Body, BodySpec, insert_body, material, separate_supports};
 use crate::config::{ObstacleMobility, ServoConfig, WorldConfig};
 use crate::contact::{lowest_point, table_wrench, tool_wrench, touches};
 use crate::effect::{BodyRole, Effect, Hooks, Memory, Nominal};
 use crate::friction::OpposeSlip;
-use crate::loads::{Effects, TableFriction};
+use crate::loads::{ContactFriction, Effects, PairFriction};
 use crate::robot::{Robot, ToolShape};
 use crate::spring::ToolSpring;
 use crate::state::BodyState;
 use crate::theta::Theta;
 
-/// Fastest body, m/s, that a push of 0.1 m/s can plausibly cause.
-const SPEED_LIMIT_MPS: f64 = 5.0;
-/// Height over the table, m, below which a body's centre has sunk into it.
-const SUNK_LIMIT_M: f64 = 0.004;
+/// What bodies may do in a world that is one.
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    /// Fastest body, m/s.
+    speed_mps: f64,
+    /// Height over the table, m, below which a body's centre has sunk into it.
+    sunk_m: f64,
+}
+
+/// What a push of 0.1 m/s can plausibly cause.
+const PUSH_LIMITS: Limits = Limits { speed_mps: 5.0, sunk_m: 0.004 };
+/// What a toss can, below the 40 m/s at which the engine cuts velocities off. It ends within a step's way of the table, and a thin thing may start
+/// by a reading's error below it.
+const RIG_LIMITS: Limits = Limits { speed_mps: 30.0, sunk_m: -0.05 };
+/// Friction of the table: above that of whatever stands on it, for the smaller one counts.
+const TABLE_FRICTION: f64 = 1e6;
 
 /// Pose of the tool: position in m and unit quaternion x, y, z, w, base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +81,7 @@ impl Wrench {
 pub enum Divergence {
     /// A pose or velocity is not finite.
     NotFinite,
-    /// A body is faster than 5 m/s.
+    /// A body is faster than 5 m/s (30 m/s in a rig, see [`crate::rig`]).
     Flies,
     /// A body's centre has sunk into the table.
     Sank,
@@ -96,6 +108,14 @@ pub struct World<'a> {
     spring: Option<ToolSpring>,
     /// Since the episode began.
     time_secs: f64,
+    limits: Limits,
+    pair_friction: Option<PairFriction>,
+}
+
+/// The object of a world, and the obstacle.
+struct Hypothesis<'h> {
+    theta: &'h Theta,
+    beyond: Beyond,
 }
 
 impl<'a> World<'a> {
@@ -103,7 +123,7 @@ impl<'a> World<'a> {
     /// [`crate::feasible::check_theta`]; those of effects are the ones in `effects`, not in `theta`.
     #[must_use]
     pub fn restore(
-        config: &'a WorldConfig,
+        config: &WorldConfig,
         effects: &'a [Box<dyn Effect>],
         theta: &Theta,
         object: &BodyState,
@@ -111,15 +131,47 @@ impl<'a> World<'a> {
         tool: &ToolPose,
         tool_shapes: &[ToolShape],
     ) -> Self {
+        let hypothesis = Hypothesis { theta, beyond: Beyond::default() };
+        Self::build(config, effects, hypothesis, object, obstacle, tool, tool_shapes)
+    }
+
+    /// The world of a rig: an object that may be more than Θ can say, wider limits, and `tool_friction` is that of the pair tool–object whatever
+    /// the object's own.
+    pub(crate) fn restore_rig(
+        config: &WorldConfig,
+        effects: &'a [Box<dyn Effect>],
+        theta: &Theta,
+        beyond: Beyond,
+        object: &BodyState,
+        tool: &ToolPose,
+        tool_shapes: &[ToolShape],
+    ) -> Self {
+        let mut world = Self::build(config, effects, Hypothesis { theta, beyond }, object, None, tool, tool_shapes);
+        world.limits = RIG_LIMITS;
+        let bodies = [world.tool, world.object.handle];
+        world.pair_friction = Some(PairFriction { bodies, coefficient: world.config.tool_friction as f32 });
+        world
+    }
+
+    fn build(
+        config: &WorldConfig,
+        effects: &'a [Box<dyn Effect>],
+        hypothesis: Hypothesis,
+        object: &BodyState,
+        obstacle: Option<&BodyState>,
+        tool: &ToolPose,
+        tool_shapes: &[ToolShape],
+    ) -> Self {
+        let Hypothesis { theta, beyond } = hypothesis;
         let changed = Nominal::with_effects(config, theta, effects);
         let (config, theta) = changed.as_ref().map_or((config, theta), |nominal| (&nominal.world, &nominal.theta));
         let support_share = changed.as_ref().and_then(|nominal| nominal.support_share);
         let mut physics = engine(config, effects);
         let (_, table) = physics.insert(
             RigidBodyBuilder::fixed().translation(vector([0.0, 0.0, config.table_height_m])),
-            material(ColliderBuilder::new(SharedShape::halfspace(Vector::Z)), 1.0, config),
+            material(ColliderBuilder::new(SharedShape::halfspace(Vector::Z)), TABLE_FRICTION, config),
         );
-        let spec = BodySpec::object(theta, support_share);
+        let spec = BodySpec::object(theta, support_share, beyond);
         let object = insert_body(&mut physics, config, BodyRole::Object, true, spec, object);
         let obstacle = theta.obstacle.as_ref().zip(obstacle).map(|(parameters, state)| {
             let movable = config.obstacle_mobility == ObstacleMobility::Movable;
@@ -157,9 +209,14 @@ impl<'a> World<'a> {
             arm: None,
             spring: None,
             time_secs: 0.0,
+            limits: PUSH_LIMITS,
+            pair_friction: None,
         };
         if let Some(nominal) = &changed {
             world.complete(nominal);
+        }
+        if world.object.on_supports {
+            separate_supports(&mut world.physics, world.table);
         }
         world
     }
@@ -174,9 +231,6 @@ impl<'a> World<'a> {
             let body = insert_body(&mut self.physics, &self.config, BodyRole::Hidden, body.movable, spec, &state);
             self.hidden.push(body);
         }
-        if nominal.support_share.is_some() {
-            separate_supports(&mut self.physics, self.table);
-        }
         if nominal.tool_stiffness_npm.is_finite() {
             let period_secs = self.config.control_period_secs;
             self.spring = Some(ToolSpring::new(&mut self.physics, self.tool, nominal.tool_stiffness_npm, period_secs));
@@ -185,13 +239,27 @@ impl<'a> World<'a> {
 
     /// The same world later in an episode, with what its effects remember. Only for a world that has not made a step.
     #[must_use]
-    pub fn with_memory(mut self, memory: &Memory) -> Self {
-        self.time_secs = memory.elapsed_secs;
-        for (body, state) in self.hidden.iter().zip(&memory.hidden).filter(|(body, _)| body.dynamic) {
+    pub fn with_memory(self, memory: &Memory) -> Self {
+        self.later(memory.elapsed_secs, &memory.hidden)
+    }
+
+    /// The same world `time_secs` after the episode began, with the bodies that only effects know of where `hidden` has them. Only for a
+    /// world that has not made a step.
+    pub(crate) fn later(mut self, time_secs: f64, hidden: &[BodyState]) -> Self {
+        self.time_secs = time_secs;
+        for (body, state) in self.hidden.iter().zip(hidden).filter(|(body, _)| body.dynamic) {
             let rigid = &mut self.physics.bodies[body.handle];
             rigid.set_position(pose(state.position_m, state.orientation), true);
             rigid.set_linvel(vector(state.linear_mps), true);
             rigid.set_angvel(vector(state.angular_rps), true);
+        }
+        self
+    }
+
+    /// The same world with the tool deflected from where it is commanded to be, `rest_m`, if it can be.
+    pub(crate) fn deflected_from(mut self, rest_m: [f64; 3]) -> Self {
+        if let Some(spring) = &mut self.spring {
+            spring.rest_at(rest_m);
         }
         self
     }
@@ -269,8 +337,8 @@ impl<'a> World<'a> {
     }
 
     fn advance(&mut self) {
-        let friction = TableFriction { effects: self.effects, table: self.table };
-        let changed = self.effects.hooks.contains(Hooks::FRICTION);
+        let friction = ContactFriction { effects: self.effects, table: self.table, pair: self.pair_friction };
+        let changed = self.effects.hooks.contains(Hooks::FRICTION) || self.pair_friction.is_some();
         let hooks: &dyn PhysicsHooks = if changed { &friction } else { &OpposeSlip };
         self.physics.step_with_events(hooks, &());
         self.time_secs += self.config.control_period_secs;
@@ -327,10 +395,10 @@ impl<'a> World<'a> {
             if !state.to_array().iter().all(|v| v.is_finite()) {
                 return Some(Divergence::NotFinite);
             }
-            if state.linear_mps.iter().map(|v| v * v).sum::<f64>().sqrt() > SPEED_LIMIT_MPS {
+            if state.linear_mps.iter().map(|v| v * v).sum::<f64>().sqrt() > self.limits.speed_mps {
                 return Some(Divergence::Flies);
             }
-            if state.position_m[2] < self.config.table_height_m + SUNK_LIMIT_M {
+            if state.position_m[2] < self.config.table_height_m + self.limits.sunk_m {
                 return Some(Divergence::Sank);
             }
         }

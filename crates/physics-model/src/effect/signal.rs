@@ -76,6 +76,14 @@ impl CommandChain {
             .then(|| Self(effects.iter().filter_map(|effect| effect.command(start)).collect()))
     }
 
+    /// As [`Self::new`], of the effects that have any of `hooks`, or of those that have none of them.
+    #[must_use]
+    pub fn of_those(effects: &[Box<dyn Effect>], start: &CommandStart, hooks: Hooks, with: bool) -> Option<Self> {
+        let those = effects.iter().filter(|effect| effect.hooks().contains(hooks) == with);
+        let chain: Vec<_> = those.filter_map(|effect| effect.command(start)).collect();
+        (!chain.is_empty()).then_some(Self(chain))
+    }
+
     /// The command of the coming control step, in place, to where the drives go.
     pub fn apply(&mut self, signal: &mut [f64]) {
         for filter in &mut self.0 {
@@ -146,7 +154,8 @@ impl PoseChain {
 #[must_use]
 pub fn read(effects: &[Box<dyn Effect>], body: &BodyState) -> BodyState {
     let mut read = *body;
-    for effect in effects {
+    // One that does nothing need not even round.
+    for effect in effects.iter().filter(|effect| effect.hooks().contains(Hooks::POSE)) {
         effect.read(&mut read);
     }
     read
@@ -156,7 +165,7 @@ pub fn read(effects: &[Box<dyn Effect>], body: &BodyState) -> BodyState {
 #[must_use]
 pub fn unread(effects: &[Box<dyn Effect>], reading: &BodyState) -> BodyState {
     let mut body = *reading;
-    for effect in effects.iter().rev() {
+    for effect in effects.iter().rev().filter(|effect| effect.hooks().contains(Hooks::POSE)) {
         effect.unread(&mut body);
     }
     body

@@ -19,7 +19,7 @@ mod urdf;
 
 use std::path::Path;
 
-use nalgebra::{Isometry3, Point3, Vector6};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector6};
 
 pub use chain::{GRAVITY_MPS2, Jacobian, JointVector, MassMatrix};
 pub use config::{JointLimit, RobotConfig};
@@ -144,6 +144,14 @@ impl Robot {
     #[must_use]
     pub fn tool_rotation(&self) -> [[f64; 3]; 3] {
         self.tool_rotation
+    }
+
+    /// R(base ← tool), the orientation that the tool keeps.
+    #[must_use]
+    pub fn tool_orientation(&self) -> UnitQuaternion<f64> {
+        let r = self.tool_rotation;
+        let rotation = Matrix3::from_fn(|row, column| r[row][column]);
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation))
     }
 
     /// Collision primitives of the hand and all that is fixed to it, in the frame of the tool link: spheres and capsules (a cylinder
