@@ -123,12 +123,14 @@ impl Policy<PushModel> for GoalPolicy {
         let along = (target - object).try_normalize(1e-9).unwrap_or_default();
         let theta = &particle.theta.object;
         let behind = theta.shape.footprint_radius_m(theta.size_m) + tool_extent_m(model, along);
-        let to_place_m = (object - along * behind - plane(tool)).norm();
+        let place = object - along * behind;
+        let to_place_m = (place - plane(tool)).norm();
         let by_way_m = if target == goal { 0.0 } else { (goal - target).norm() };
         let to_goal_m = ((target - object).norm() + by_way_m - task.goal.radius_m).max(0.0);
         let steps = ((to_place_m + to_goal_m) / task.step_m).ceil().max(1.0) as usize;
         let cost = |count: usize| (0..count).map(|t| task.reward.step * task.discount.powi(t as i32)).sum::<f64>();
-        if steps > actions_left {
+        // An object that the tool cannot get behind is lost: it stands or has rolled where it can only be pushed farther away.
+        if steps > actions_left || !task.reach.contains([place.x, place.y, tool[2]]) {
             return cost(actions_left);
         }
         cost(steps) + task.reward.goal * task.discount.powi(steps as i32 - 1)

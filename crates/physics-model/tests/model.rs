@@ -5,8 +5,10 @@ mod support;
 use physics_model::config::ObstacleMobility;
 use physics_model::world::World;
 use physics_model::{
-    Action, BodyState, HeuristicPolicy, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushModel, State, Theta,
+    Action, BodyState, GoalPolicy, HeuristicPolicy, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushModel,
+    State, Theta,
 };
+
 use pomdp::conformance::{
     check_generative_model, check_observation_model, check_parameters_stay, check_static_parameters,
 };
@@ -136,6 +138,22 @@ fn a_push_along_the_path_earns_the_rewards_in_turn() {
     assert_eq!(rewards.iter().filter(|r| **r == 9.0).count(), 1, "moved once: {rewards:?}");
     assert_eq!(rewards.last(), Some(&99.0), "{rewards:?}");
     assert!(model.config().task.goal.contains(particle.state.object.position_m));
+}
+
+#[test]
+fn an_object_that_the_tool_cannot_get_behind_is_not_expected_at_the_goal() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let task = &model.config().task;
+    let value = |x_m: f64, y_m: f64| {
+        let mut particle = particle(&model, &joints, y_m);
+        particle.state.object.position_m[0] = x_m;
+        GoalPolicy.leaf_value(&model, &particle, 20)
+    };
+    let steps: f64 = (0..20).map(|t| -task.discount.powi(t)).sum();
+    assert!(value(0.5, -0.1) > 20.0);
+    // Beyond the border the arm could only push it farther away.
+    assert_eq!(value(task.reach.x_m[0] - 0.01, 0.07), steps);
+    assert_eq!(value(0.5, task.reach.y_m[0] - 0.01), steps);
 }
 
 #[test]
