@@ -1,8 +1,10 @@
 //! What effects do to a live world in each control step: loads on bodies, mass, friction of contacts, attraction of the tool.
 
+use rapier3d::geometry::NEW_CONTACT_BIT;
 use rapier3d::parry::query;
 use rapier3d::prelude::{
-    ColliderHandle, ColliderSet, ContactModificationContext, PhysicsHooks, PhysicsWorld, RigidBodyHandle, Vector,
+    ColliderHandle, ColliderSet, ContactModificationContext, PhysicsHooks, PhysicsWorld, RigidBody, RigidBodyHandle,
+    SolverContact, Vector,
 };
 
 use crate::bodies::Body;
@@ -114,32 +116,56 @@ fn nearest(
 pub(crate) struct ContactFriction<'a> {
     pub(crate) effects: Effects<'a>,
     pub(crate) table: ColliderHandle,
-    pub(crate) pair: Option<PairFriction>,
+    pub(crate) rig: Option<RigFriction>,
 }
 
-/// Friction coefficient of two bodies that their materials do not decide.
+/// What the contacts of a rig have beyond their materials: the pair tool–object has its own coefficient, and bounces have all of their friction.
+///
+/// The engine adds the impulse of restitution after the friction of a step, so that a body that bounces is held back by μ times the first part
+/// of the normal impulse alone, 1 / (1 + e) of it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PairFriction {
-    pub(crate) bodies: [RigidBodyHandle; 2],
+pub(crate) struct RigFriction {
+    /// Tool and object.
+    pub(crate) pair: [RigidBodyHandle; 2],
+    /// Of that pair.
     pub(crate) coefficient: f32,
+    /// What gravity adds to a speed in a step, m/s.
+    pub(crate) fall_mps: f32,
 }
 
-impl PairFriction {
+impl RigFriction {
     fn set(&self, context: &mut ContactModificationContext) {
-        let [a, b] = self.bodies;
-        let found = [context.rigid_body1, context.rigid_body2];
-        if (found == [Some(a), Some(b)] || found == [Some(b), Some(a)])
-            && let Some(manifold) = context.rigid_mut()
-        {
+        let (bodies, found) = (context.bodies, [context.rigid_body1, context.rigid_body2]);
+        let [first, second] = found.map(|handle| handle.and_then(|handle| bodies.get(handle)));
+        let Some(manifold) = context.rigid_mut() else { return };
+        let [a, b] = self.pair.map(Some);
+        if found == [a, b] || found == [b, a] {
             *manifold.friction = self.coefficient;
         }
+        if *manifold.restitution == 0.0 || manifold.solver_contacts.is_empty() {
+            return;
+        }
+        let normal = *manifold.normal;
+        let bounce = |contact: &SolverContact| {
+            // As the engine decides: what was pushed before rests.
+            if contact.contact_id[0] & NEW_CONTACT_BIT == 0 {
+                return 0.0;
+            }
+            let point = (contact.anchor1 + contact.anchor2) * 0.5;
+            let velocity = |body: Option<&RigidBody>| body.map_or(Vector::ZERO, |b| b.velocity_at_point(point));
+            let speed = (velocity(first) - velocity(second)).dot(normal).max(0.0);
+            // The rest of the first part is what holds the weight.
+            speed / (speed + self.fall_mps)
+        };
+        let mean = manifold.solver_contacts.iter().map(bounce).sum::<f32>() / manifold.solver_contacts.len() as f32;
+        *manifold.friction *= 1.0 + *manifold.restitution * mean;
     }
 }
 
 impl PhysicsHooks for ContactFriction<'_> {
     fn modify_solver_contacts(&self, context: &mut ContactModificationContext) {
-        if let Some(pair) = &self.pair {
-            pair.set(context);
+        if let Some(rig) = &self.rig {
+            rig.set(context);
         }
         let body = match self.table {
             table if table == context.collider1 => context.rigid_body2,

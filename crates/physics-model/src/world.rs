@@ -18,7 +18,7 @@ use crate::config::{ObstacleMobility, ServoConfig, WorldConfig};
 use crate::contact::{lowest_point, table_wrench, tool_wrench, touches};
 use crate::effect::{BodyRole, Effect, Hooks, Memory, Nominal};
 use crate::friction::OpposeSlip;
-use crate::loads::{ContactFriction, Effects, PairFriction};
+use crate::loads::{ContactFriction, Effects, RigFriction};
 use crate::robot::{Robot, ToolShape};
 use crate::spring::ToolSpring;
 use crate::state::BodyState;
@@ -109,7 +109,7 @@ pub struct World<'a> {
     /// Since the episode began.
     time_secs: f64,
     limits: Limits,
-    pair_friction: Option<PairFriction>,
+    rig_friction: Option<RigFriction>,
 }
 
 /// The object of a world, and the obstacle.
@@ -148,8 +148,12 @@ impl<'a> World<'a> {
     ) -> Self {
         let mut world = Self::build(config, effects, Hypothesis { theta, beyond }, object, None, tool, tool_shapes);
         world.limits = RIG_LIMITS;
-        let bodies = [world.tool, world.object.handle];
-        world.pair_friction = Some(PairFriction { bodies, coefficient: world.config.tool_friction as f32 });
+        let fall_mps = world.config.gravity_mps2 * world.config.control_period_secs;
+        world.rig_friction = Some(RigFriction {
+            pair: [world.tool, world.object.handle],
+            coefficient: world.config.tool_friction as f32,
+            fall_mps: fall_mps as f32,
+        });
         world
     }
 
@@ -210,7 +214,7 @@ impl<'a> World<'a> {
             spring: None,
             time_secs: 0.0,
             limits: PUSH_LIMITS,
-            pair_friction: None,
+            rig_friction: None,
         };
         if let Some(nominal) = &changed {
             world.complete(nominal);
@@ -337,8 +341,8 @@ impl<'a> World<'a> {
     }
 
     fn advance(&mut self) {
-        let friction = ContactFriction { effects: self.effects, table: self.table, pair: self.pair_friction };
-        let changed = self.effects.hooks.contains(Hooks::FRICTION) || self.pair_friction.is_some();
+        let friction = ContactFriction { effects: self.effects, table: self.table, rig: self.rig_friction };
+        let changed = self.effects.hooks.contains(Hooks::FRICTION) || self.rig_friction.is_some();
         let hooks: &dyn PhysicsHooks = if changed { &friction } else { &OpposeSlip };
         self.physics.step_with_events(hooks, &());
         self.time_secs += self.config.control_period_secs;

@@ -20,6 +20,12 @@
 //! At the start the tool is where its commands have brought it, not at [`RigStart::tool_m`]: a kinematic tool would make a jump of the
 //! reading's noise or of the model's error and kick the object. The measured place counts where there are no commands before, and as the
 //! deflection of an arm that gives way.
+//!
+//! # Bounces
+//!
+//! A contact is seen when it overlaps, up to a step's way late: a toss at 2.5 m/s needs steps of about 1 ms for its restitution (at 5 ms half
+//! of e = 0.2 is lost). A sphere then bounces by e within 1 %, a box that lands flat on four points by 0.88 e. What friction takes in a bounce is
+//! right within a quarter, by where in a step it begins, and within a tenth in the mean.
 
 mod drive;
 mod object;
