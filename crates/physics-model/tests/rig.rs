@@ -3,7 +3,6 @@
 mod support;
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::effect::{Effect, EffectKind};
@@ -480,34 +479,4 @@ fn absurd_starts_are_reported() {
         ball().run(&massless, &[], &RigStart::of_episode(standing(), Some(tool_m)), &[]),
         Err(RigError::Object { what: "mass", .. })
     ));
-}
-
-#[test]
-#[ignore = "prints times"]
-#[expect(clippy::disallowed_methods, reason = "nothing depends on it")]
-fn times() {
-    let (arm, at, tool_m) = arm("sawyer");
-    let arm_commands = forth_and_back(tool_m, 0.1);
-    let arm_start = RigStart::of_episode(at, Some(tool_m));
-    let prism = RigObject { shape: rectangle(vec![[0.02, 0.0], [-0.02, 0.02], [-0.02, -0.02]]), ..cuboid() };
-    let (tool_m, commands) = push(200);
-    let start = RigStart::of_episode(standing(), Some(tool_m));
-    let mut one = ball();
-    one.tick_steps = 1;
-    one.world.control_period_secs = 0.01;
-    for (name, rig, object, start, commands) in [
-        ("ball, box, one step a tick", &one, cuboid(), &start, &commands),
-        ("ball, box, two steps a tick", &ball(), cuboid(), &start, &commands),
-        ("ball, prism on feet, two steps", &ball(), prism, &start, &commands),
-        ("Sawyer, box, two steps", &arm, cuboid(), &arm_start, &arm_commands),
-    ] {
-        let best = (0..20)
-            .map(|_| {
-                let begin = Instant::now();
-                rig.run(&object, &[], start, commands).unwrap();
-                begin.elapsed().as_secs_f64()
-            })
-            .fold(f64::INFINITY, f64::min);
-        println!("{name}: {:.2} ms for {} ticks", 1e3 * best, commands.len());
-    }
 }
