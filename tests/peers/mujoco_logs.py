@@ -613,7 +613,8 @@ def make_set(out, name, effect, seed, options, log=print):
     index = int(name.split("-")[1])
     rng = np.random.default_rng([seed, index])
     tick_s = TICK_S * options.thin
-    shape = "sphere" if effect == "rolling_resistance" else "cylinder" if rng.random() < 0.25 and effect != "pressure_distribution" else "box"
+    # A cylinder with its centre of mass aside topples, and lying it would roll on eight points.
+    shape = "sphere" if effect == "rolling_resistance" else "cylinder" if rng.random() < 0.25 and effect not in ("pressure_distribution", "com_offset") else "box"
     errors = {"mass": float(rng.uniform(0.9, 1.1)), "friction": float(rng.uniform(0.9, 1.1))}
     if effect == "friction_level":
         errors["friction"] = 1.6
