@@ -51,6 +51,8 @@ pub(crate) struct BodySpec {
 /// What Θ cannot say of an object: the things of measured logs. Nothing of it by default.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Beyond {
+    /// Whether it bears on four points, corners or points of its rim, that stay the same whatever contacts the engine finds.
+    pub(crate) on_points: bool,
     /// What the shape is instead of that of Θ, which is a box around it.
     pub(crate) prism: Option<Arc<Prism>>,
     /// Inertia about the centre of mass along the object's axes, kg m²; `None`: that of a uniform solid.
@@ -62,6 +64,7 @@ pub(crate) struct Beyond {
 impl BodySpec {
     pub(crate) fn object(theta: &Theta, support_share: Option<f64>, beyond: Beyond) -> Self {
         let o = &theta.object;
+        let support_share = support_share.or(beyond.on_points.then_some(1.0));
         // A sphere bears on one point anyway.
         let support_share = support_share.filter(|_| o.shape != ObjectShape::Sphere);
         Self {

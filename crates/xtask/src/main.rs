@@ -31,6 +31,9 @@ enum Verb {
     /// Turns published measurements into a log that can be diagnosed.
     #[command(disable_help_flag = true)]
     ImportLog(Rest),
+    /// Finds where a log and the simulation disagree and names the missing effect.
+    #[command(disable_help_flag = true)]
+    Diagnose(Rest),
     /// Times the parts and checks their accuracy, beside peers where those are installed.
     #[command(disable_help_flag = true)]
     Bench(Rest),
@@ -52,6 +55,7 @@ fn main() -> ExitCode {
         Verb::Calibrate(rest) => program("calibrate", &rest.arguments),
         Verb::Eval(rest) => program("eval", &rest.arguments),
         Verb::ImportLog(rest) => program("import-log", &rest.arguments),
+        Verb::Diagnose(rest) => program("diagnose", &rest.arguments),
         Verb::Bench(rest) => program("bench", &rest.arguments),
         Verb::Ci => ci(),
     };

@@ -1,0 +1,177 @@
+//! What is done to an object while a log is recorded.
+
+use pomdp::Rng;
+use rand::RngExt as _;
+
+/// One episode: where the object begins and where the tool is sent.
+#[derive(Clone, Debug)]
+pub struct Script {
+    /// Centre of the object, m, over its resting place.
+    pub place_m: [f64; 2],
+    /// Height, m, over its resting height.
+    pub lift_m: f64,
+    /// Yaw, rad.
+    pub yaw_rad: f64,
+    /// Known weight, kg.
+    pub added_mass_kg: f64,
+    /// Commands, one a tick; the first is where the tool begins.
+    pub commands: Vec<[f64; 3]>,
+}
+
+/// What a script needs to know of the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene {
+    /// Tick, s.
+    pub period_secs: f64,
+    /// Height of the tool's centre while it pushes, m.
+    pub tool_height_m: f64,
+    /// From the object's centre to where the tool's centre touches it, m.
+    pub touch_m: f64,
+    /// Half the width of the object across the push, m.
+    pub half_width_m: f64,
+    /// Centre of the scene, m.
+    pub centre_m: [f64; 2],
+}
+
+/// Places along a path, a tick apart.
+struct Path {
+    period_secs: f64,
+    points: Vec<[f64; 3]>,
+}
+
+impl Path {
+    fn from(period_secs: f64, start: [f64; 3]) -> Self {
+        Self { period_secs, points: vec![start] }
+    }
+
+    fn end(&self) -> [f64; 3] {
+        self.points[self.points.len() - 1]
+    }
+
+    fn wait(&mut self, secs: f64) {
+        let end = self.end();
+        let ticks = (secs / self.period_secs).round() as usize;
+        self.points.extend(std::iter::repeat_n(end, ticks));
+    }
+
+    /// Speeds up within 0.1 s, goes at `speed_mps`, slows down within `brake_secs`.
+    fn go(&mut self, to: [f64; 3], speed_mps: f64, brake_secs: f64) {
+        let from = self.end();
+        let length = (0..3).map(|i| (to[i] - from[i]).powi(2)).sum::<f64>().sqrt();
+        if length == 0.0 {
+            return;
+        }
+        let start_secs = 0.1_f64;
+        let speed = speed_mps.min(length / (0.5 * (start_secs + brake_secs)) * 0.99);
+        let cruise = (length - 0.5 * speed * (start_secs + brake_secs)) / speed;
+        let total = start_secs + cruise + brake_secs;
+        let way = |t: f64| {
+            let up = t.min(start_secs);
+            let mid = (t - start_secs).clamp(0.0, cruise);
+            let down = (t - start_secs - cruise).clamp(0.0, brake_secs);
+            speed * (0.5 * up * up / start_secs + mid + down - 0.5 * down * down / brake_secs)
+        };
+        let ticks = (total / self.period_secs).ceil() as usize;
+        for tick in 1..=ticks {
+            let share = (way(tick as f64 * self.period_secs) / length).min(1.0);
+            self.points.push(std::array::from_fn(|i| from[i] + share * (to[i] - from[i])));
+        }
+    }
+}
+
+/// A push along `angle_rad`: to the object, `distance_m` on, a short brake, back, a rest.
+fn push(
+    scene: &Scene,
+    place_m: [f64; 2],
+    angle_rad: f64,
+    aside_m: f64,
+    speed_mps: f64,
+    distance_m: f64,
+) -> Vec<[f64; 3]> {
+    let (sin, cos) = angle_rad.sin_cos();
+    let at = |along: f64| {
+        [place_m[0] + along * cos - aside_m * sin, place_m[1] + along * sin + aside_m * cos, scene.tool_height_m]
+    };
+    let begin = -(scene.touch_m + 0.03);
+    let mut path = Path::from(scene.period_secs, at(begin));
+    path.wait(0.2);
+    path.go(at(-scene.touch_m + distance_m), speed_mps, 0.04);
+    path.wait(0.15);
+    path.go(at(-scene.touch_m + distance_m - 0.03), 0.1, 0.1);
+    path.wait(0.3);
+    path.points
+}
+
+/// A designed set: eight directions at four speeds, known weights, reversals, drops, long rests and free motion.
+#[must_use]
+pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
+    let mut draw = || -> f64 { rng.random_range(-1.0..1.0) };
+    let mut scripts = Vec::new();
+    for (s, speed) in [0.03, 0.08, 0.16, 0.3].into_iter().enumerate() {
+        for direction in 0..8 {
+            let place_m = [scene.centre_m[0] + 0.1 * draw(), scene.centre_m[1] + 0.1 * draw()];
+            let angle = f64::from(direction) * std::f64::consts::FRAC_PI_4;
+            // Through the middle, left and right of it.
+            let aside = [0.0, 0.35, -0.35][(direction as usize + s) % 3] * scene.half_width_m;
+            let commands = push(scene, place_m, angle, aside, speed, 0.08);
+            let yaw_rad = if direction % 2 == 0 { 0.0 } else { 0.6 * draw() } + angle;
+            let added_mass_kg = if (direction as usize + s) % 4 == 1 { 0.3 } else { 0.0 };
+            scripts.push(Script { place_m, lift_m: 0.0, yaw_rad, added_mass_kg, commands });
+        }
+    }
+    for index in 0..2 {
+        // Back and forth in the air and at the object: what shows on reversal and where nothing touches.
+        let place_m = [scene.centre_m[0] + 0.05 * draw(), scene.centre_m[1] + 0.05 * draw()];
+        let start = [place_m[0] - scene.touch_m - 0.05, place_m[1], scene.tool_height_m];
+        let mut path = Path::from(scene.period_secs, start);
+        path.wait(0.2);
+        for (dx, dy, dz) in [(-0.04, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.05, 0.03), (0.0, -0.05, 0.0), (0.0, 0.0, 0.0)]
+        {
+            path.go([start[0] + dx, start[1] + dy, start[2] + dz], [0.1, 0.25][index], 0.1);
+            path.wait(0.1);
+        }
+        path.go([place_m[0] - scene.touch_m + 0.04, place_m[1], scene.tool_height_m], 0.06, 0.1);
+        path.wait(0.5);
+        path.go(start, 0.2, 0.1);
+        path.wait(0.3);
+        scripts.push(Script { place_m, lift_m: 0.0, yaw_rad: 0.0, added_mass_kg: 0.0, commands: path.points });
+    }
+    for index in 0..2 {
+        let place_m = [scene.centre_m[0] + 0.1 * draw(), scene.centre_m[1]];
+        let start = [place_m[0] - scene.touch_m - 0.1, place_m[1], scene.tool_height_m];
+        let mut path = Path::from(scene.period_secs, start);
+        path.wait(0.6);
+        let lift_m = [0.03, 0.08][index];
+        scripts.push(Script { place_m, lift_m, yaw_rad: 0.3 * draw(), added_mass_kg: 0.0, commands: path.points });
+    }
+    for _ in 0..2 {
+        // What grows with time: a push, a long rest, a push.
+        let place_m = scene.centre_m;
+        let mut commands = push(scene, place_m, 0.0, 0.0, 0.08, 0.05);
+        let mut path = Path::from(scene.period_secs, commands[commands.len() - 1]);
+        path.wait(25.0);
+        let end = path.end();
+        path.go([end[0] + 0.1, end[1], end[2]], 0.08, 0.04);
+        path.wait(0.2);
+        path.go(end, 0.1, 0.1);
+        commands.extend(&path.points[1..]);
+        scripts.push(Script { place_m, lift_m: 0.0, yaw_rad: 0.0, added_mass_kg: 0.0, commands });
+    }
+    scripts
+}
+
+/// A passive log: pushes as they come, at the speeds of everyday work, nothing known added, nothing tried on purpose.
+#[must_use]
+pub fn passive(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
+    let mut draw = || -> f64 { rng.random_range(-1.0..1.0) };
+    (0..40)
+        .map(|_| {
+            let place_m = [scene.centre_m[0] + 0.12 * draw(), scene.centre_m[1] + 0.12 * draw()];
+            let angle = std::f64::consts::PI * draw();
+            let aside = 0.5 * draw() * scene.half_width_m;
+            let speed = 0.12 + 0.08 * draw();
+            let commands = push(scene, place_m, angle, aside, speed, 0.08 + 0.04 * draw());
+            Script { place_m, lift_m: 0.0, yaw_rad: angle + 0.5 * draw(), added_mass_kg: 0.0, commands }
+        })
+        .collect()
+}

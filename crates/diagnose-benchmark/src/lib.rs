@@ -1,0 +1,4 @@
+//! Logs whose missing effect is known to nobody but the scorer.
+
+pub mod actions;
+pub mod generate;

@@ -1,0 +1,295 @@
+//! Every effect of the catalogue as coordinates that a fit can go along, and the places to begin from.
+//!
+//! A coordinate a moves a parameter from its neutral or starting value by a · unit, in the parameter's own scale (its reciprocal for
+//! stiffnesses and limits). Units are such that N(0, 1) covers what is plausible: the prior of a fit.
+
+use physics_model::config::WorldConfig;
+use physics_model::effect::parameter::{Parameter, Scale};
+use physics_model::effect::{EffectConfig, EffectKind};
+use physics_model::{ObjectShape, Theta};
+
+/// Of the distance from the neutral to the farthest plausible value: one standard deviation of the prior of a strength.
+const STRENGTH_SHARE: f64 = 1.0 / 1.5;
+/// Standard deviation of where something is, m, around the place that a fit begins from.
+const PLACE_M: f64 = 0.05;
+
+/// What is known of the log before any effect is tried.
+#[derive(Clone, Debug)]
+pub struct Context {
+    /// The nominal world.
+    pub world: WorldConfig,
+    /// The nominal object.
+    pub theta: Theta,
+    /// Places over which the object moves, m, base frame: centres of clusters.
+    pub places_m: Vec<[f64; 2]>,
+    /// Places at which something may stand in the way, m.
+    pub obstacles_m: Vec<[f64; 2]>,
+    /// Largest force that was read, N; 0 without a sensor.
+    pub largest_force_n: f64,
+    /// Whether there is a tool that is commanded.
+    pub tool: bool,
+    /// Whether the log has forces at the wrist or torques of joints.
+    pub forces: bool,
+    /// Whether there is an arm with joints.
+    pub joints: bool,
+    /// Whether torques of joints were measured.
+    pub joint_torques: bool,
+}
+
+/// One coordinate of a candidate.
+#[derive(Clone, Copy, Debug)]
+pub struct Coordinate {
+    /// Index of the parameter in the effect.
+    pub index: usize,
+    /// Value where a = 0, in the parameter's scale.
+    pub origin: f64,
+    /// Change of the scaled value for a = 1.
+    pub unit: f64,
+    /// Range of a.
+    pub range: [f64; 2],
+    /// Whether the effect is absent at a = 0 of this and its like.
+    pub strength: bool,
+}
+
+/// An effect from a place to begin from.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The effect with neutral strengths and the starting values of the rest.
+    pub base: EffectConfig,
+    /// Continuous coordinates that a fit moves.
+    pub coordinates: Vec<Coordinate>,
+    /// Coordinates that a fit starts from for what has no small version of itself (a body in the way); `None`: from 0.
+    pub begin: Option<Vec<f64>>,
+}
+
+impl Candidate {
+    /// Kind of the effect.
+    #[must_use]
+    pub fn kind(&self) -> EffectKind {
+        self.base.kind()
+    }
+
+    /// The effect at coordinates `a`, one for each of [`Self::coordinates`]; they are held within their ranges.
+    #[must_use]
+    pub fn effect(&self, a: &[f64]) -> EffectConfig {
+        let mut values = self.base.values();
+        let parameters = self.kind().parameters();
+        for (coordinate, a) in self.coordinates.iter().zip(a) {
+            let a = a.clamp(coordinate.range[0], coordinate.range[1]);
+            let parameter = &parameters[coordinate.index];
+            let value = parameter.scale.value(coordinate.origin + a * coordinate.unit);
+            let [low, high] = parameter.limits;
+            values[coordinate.index] = value.clamp(low, high);
+        }
+        self.base.with_parameters(&values).unwrap_or_else(|_| self.base.clone())
+    }
+
+    /// Coordinates of the strengths.
+    pub fn strengths(&self) -> impl Iterator<Item = usize> + '_ {
+        self.coordinates.iter().enumerate().filter(|(_, c)| c.strength).map(|(index, _)| index)
+    }
+}
+
+/// All candidates that could show in such a log.
+#[must_use]
+pub fn candidates(context: &Context) -> Vec<Candidate> {
+    EffectKind::ALL.iter().filter(|kind| applies(**kind, context)).flat_map(|kind| of_kind(*kind, context)).collect()
+}
+
+/// Whether an effect could show at all.
+fn applies(kind: EffectKind, context: &Context) -> bool {
+    use EffectKind as K;
+    let sphere = context.theta.object.shape == ObjectShape::Sphere;
+    match kind {
+        K::ForceBias | K::ForceDrift | K::ForceGain | K::ForceLowPass | K::ForceSaturation | K::WristPayload => {
+            context.forces
+        }
+        K::JointFriction => context.joint_torques,
+        K::Backlash => context.joints,
+        K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion => context.tool,
+        K::RollingResistance => sphere,
+        K::PressureDistribution => !sphere,
+        _ => true,
+    }
+}
+
+fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
+    let neutral = kind.neutral(&context.world, &context.theta);
+    let with = |changes: &[(usize, f64)]| {
+        let mut values = neutral.values();
+        for (index, value) in changes {
+            values[*index] = *value;
+        }
+        let base = neutral.with_parameters(&values).unwrap_or_else(|_| neutral.clone());
+        Candidate { coordinates: coordinates(&base, context), base, begin: None }
+    };
+    match kind {
+        // Both harmonics of the direction.
+        EffectKind::AnisotropicFriction => vec![with(&[(1, 0.0)]), with(&[(1, std::f64::consts::FRAC_PI_4)])],
+        EffectKind::FrictionPatch => {
+            context.places_m.iter().map(|[x, y]| with(&[(1, *x), (2, *y), (3, 0.05)])).collect()
+        }
+        // In the middle and to all sides of it: where an object is pulled to from everywhere, or pushed along by.
+        EffectKind::Tether => {
+            let n = context.places_m.len().max(1) as f64;
+            let mean = |axis: usize| context.places_m.iter().map(|place| place[axis]).sum::<f64>() / n;
+            let sides = [[0.0, 0.0], [0.12, 0.0], [-0.12, 0.0], [0.0, 0.12], [0.0, -0.12]];
+            sides.iter().map(|[dx, dy]| with(&[(1, mean(0) + dx), (2, mean(1) + dy)])).collect()
+        }
+        EffectKind::StribeckFriction => [0.02, 0.06].iter().map(|v| with(&[(1, *v)])).collect(),
+        EffectKind::HiddenObstacle => obstacles(context),
+        _ => vec![with(&[])],
+    }
+}
+
+/// Slim upright bodies, fixed and movable, where something seems to stand in the way.
+fn obstacles(context: &Context) -> Vec<Candidate> {
+    let choices = EffectKind::HiddenObstacle.variants();
+    let mut all = Vec::new();
+    for place in &context.obstacles_m {
+        for base in &choices {
+            let EffectConfig::HiddenObstacle(choice) = base else { continue };
+            if choice.shape != ObjectShape::Cylinder {
+                continue;
+            }
+            let start = [place[0], place[1], 0.0, 0.03, 0.08, 0.0, 1.0];
+            let Ok(base) = base.with_parameters(&start) else { continue };
+            let unit = |index: usize, unit: f64, range: [f64; 2]| Coordinate {
+                index,
+                origin: start[index],
+                unit,
+                range,
+                strength: index == 3,
+            };
+            let mut coordinates =
+                vec![unit(0, 0.03, [-4.0, 4.0]), unit(1, 0.03, [-4.0, 4.0]), unit(3, 0.015, [-1.3, 4.0])];
+            if choice.movable {
+                coordinates.push(unit(6, 0.6, [-1.5, 6.0]));
+            }
+            let begin = Some(vec![0.0; coordinates.len()]);
+            all.push(Candidate { base, coordinates, begin });
+        }
+    }
+    all
+}
+
+fn coordinates(base: &EffectConfig, context: &Context) -> Vec<Coordinate> {
+    let kind = base.kind();
+    let values = base.values();
+    kind.parameters()
+        .iter()
+        .enumerate()
+        .filter(|(index, _)| !left_alone(kind, *index, context))
+        .map(|(index, parameter)| coordinate(kind, index, parameter, values[index], context))
+        .collect()
+}
+
+/// What no log of this kind can say.
+fn left_alone(kind: EffectKind, index: usize, context: &Context) -> bool {
+    match kind {
+        // Where a payload's centre is shows in torques alone.
+        EffectKind::WristPayload => index > 0,
+        EffectKind::ContactCompliance => index == 1,
+        // The centre of a sphere that stays where it is in the table's frame.
+        EffectKind::ComOffset => index == 2 && context.theta.object.shape != ObjectShape::Sphere,
+        _ => false,
+    }
+}
+
+fn coordinate(kind: EffectKind, index: usize, parameter: &Parameter, value: f64, context: &Context) -> Coordinate {
+    let scale = parameter.scale;
+    let origin = scale.coordinate(value);
+    if !parameter.is_strength() {
+        let unit = match (kind, parameter.unit) {
+            (EffectKind::Tether, _) => 0.1,
+            (_, "m") if parameter.name.ends_with("radius_m") => 0.02,
+            (_, "m") => PLACE_M,
+            (_, "rad") => 0.4,
+            (_, "m/s") => 0.02,
+            _ => 0.5 * (parameter.plausible[1] - parameter.plausible[0]).abs(),
+        };
+        let ends = parameter.limits.map(|limit| (limit - origin) / unit);
+        return Coordinate { index, origin, unit, range: [ends[0].max(-5.0), ends[1].min(5.0)], strength: false };
+    }
+    let [low, high] = if kind == EffectKind::ForceSaturation {
+        // What was never reached clips nothing.
+        [0.3 * context.largest_force_n.max(0.1), f64::INFINITY]
+    } else {
+        parameter.plausible
+    };
+    let [a, b] = [scale.coordinate(low), scale.coordinate(high)];
+    let farthest = if (a - origin).abs() > (b - origin).abs() { a } else { b };
+    let unit = STRENGTH_SHARE * (farthest - origin).abs().max(1e-9);
+    // One that is plausible on one side alone is looked for there.
+    let (least, most) = (a.min(b), a.max(b));
+    let tolerance = 1e-9 * unit;
+    let below = if least < origin - tolerance { -4.0 } else { 0.0 };
+    let above = if most > origin + tolerance { 4.0 } else { 0.0 };
+    let [from, to] = match scale {
+        Scale::Linear => parameter.limits,
+        Scale::Reciprocal => [0.0, scale.coordinate(parameter.limits[0])],
+    };
+    let range = [((from - origin) / unit).max(below), ((to - origin) / unit).min(above)];
+    Coordinate { index, origin, unit, range, strength: true }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use physics_model::ObjectTheta;
+
+    pub(crate) fn context() -> Context {
+        let nominal = crate::nominal::Engine::default();
+        let world = WorldConfig {
+            control_period_secs: 0.01,
+            control_steps: 1,
+            solver_iterations: nominal.solver_iterations,
+            contact_frequency_hz: nominal.contact_frequency_hz,
+            contact_damping_ratio: nominal.contact_damping_ratio,
+            table_height_m: 0.0,
+            gravity_mps2: 9.81,
+            tool_friction: 0.2,
+            obstacle_friction: 0.5,
+            arm_stiffness_npm: 50_000.0,
+            restitution: 0.0,
+            obstacle_mobility: physics_model::config::ObstacleMobility::Movable,
+        };
+        let object =
+            ObjectTheta { shape: ObjectShape::Box, mass_kg: 0.5, com_m: [0.0; 3], friction: 0.4, size_m: [0.08; 3] };
+        Context {
+            world,
+            theta: Theta { object, obstacle: None, effects: Vec::new() },
+            places_m: vec![[0.4, 0.0]],
+            obstacles_m: vec![[0.5, 0.1]],
+            largest_force_n: 10.0,
+            tool: true,
+            forces: true,
+            joints: true,
+            joint_torques: true,
+        }
+    }
+
+    #[test]
+    fn candidates_are_neutral_where_they_begin_and_plausible_one_unit_away() {
+        let context = context();
+        let all = candidates(&context);
+        for kind in EffectKind::ALL {
+            let expected = *kind != EffectKind::RollingResistance;
+            assert_eq!(all.iter().any(|c| c.kind() == *kind), expected, "{}", kind.name());
+        }
+        for candidate in &all {
+            let zero = vec![0.0; candidate.coordinates.len()];
+            assert_eq!(candidate.effect(&zero), candidate.base);
+            for index in candidate.strengths() {
+                let coordinate = &candidate.coordinates[index];
+                assert!(coordinate.range[0] <= 0.0 && coordinate.range[1] >= 0.0, "{coordinate:?}");
+                let sign = if coordinate.range[1] >= 1.0 { 1.0 } else { -1.0 };
+                let mut a = zero.clone();
+                a[index] = sign;
+                let effect = candidate.effect(&a);
+                assert_ne!(effect, candidate.base);
+                assert!(effect.check().is_ok(), "{effect:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! What can go wrong.
+
+/// Errors of this crate: one sentence each.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The log cannot be read.
+    #[error(transparent)]
+    Log(#[from] measured_log::Error),
+    /// A model cannot be built from the log's header, or from a model file.
+    #[error("the nominal model: {reason}")]
+    Model {
+        /// What is wrong.
+        reason: String,
+    },
+    /// The log lacks what a diagnosis needs.
+    #[error("{log}: {reason}")]
+    Unfit {
+        /// Folder of the log.
+        log: String,
+        /// What is missing.
+        reason: String,
+    },
+    /// A scenario or robot of the project cannot be read.
+    #[error(transparent)]
+    Scenario(#[from] scenario::Error),
+    /// The folder for the results cannot be made.
+    #[error("cannot create {}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: std::path::PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file could not be written whole.
+    #[error("{source}: {}", source.source)]
+    Write {
+        /// What was tried, on which file, and why it failed.
+        #[from]
+        source: whole_file::Error,
+    },
+}

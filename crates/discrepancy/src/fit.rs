@@ -1,0 +1,238 @@
+//! Maximum a posteriori fits: Levenberg–Marquardt with Broyden's updates, because a Jacobian costs a simulation of all episodes for each
+//! coordinate and a step only one.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::model::Model;
+use crate::study::{Stack, Study, chi2, difference, dot};
+
+/// Steps between two fresh Jacobians, at most.
+const STEPS: usize = 4;
+/// A step that promises less than this in ln posterior is not made.
+const WORTHWHILE: f64 = 0.05;
+
+/// A fitted model.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// What was fitted.
+    pub model: Model,
+    /// Its coordinates.
+    pub x: Vec<f64>,
+    /// Residuals there, standardised but not white.
+    pub raw: Vec<Vec<f64>>,
+    /// White residuals there.
+    pub residuals: Stack,
+    /// Their derivatives by the coordinates, as finite differences there.
+    pub jacobian: Vec<Stack>,
+}
+
+impl Fit {
+    /// The same as seen by some of the episodes alone.
+    #[must_use]
+    pub fn part(&self, places: &[usize]) -> Self {
+        Self {
+            model: self.model.clone(),
+            x: self.x.clone(),
+            raw: places.iter().map(|place| self.raw[*place].clone()).collect(),
+            residuals: pick(&self.residuals, places),
+            jacobian: self.jacobian.iter().map(|column| pick(column, places)).collect(),
+        }
+    }
+
+    /// Sum of squares of the white residuals.
+    #[must_use]
+    pub fn chi2(&self) -> f64 {
+        chi2(&self.residuals)
+    }
+
+    /// Laplace's ln evidence with residuals whose variance is `dispersion`.
+    #[must_use]
+    pub fn log_evidence(&self, dispersion: f64) -> f64 {
+        let prior = 0.5 * self.x.iter().map(|x| x * x).sum::<f64>();
+        let n = self.x.len();
+        let hessian = DMatrix::from_fn(n, n, |i, j| {
+            dot(&self.jacobian[i], &self.jacobian[j]) / dispersion + f64::from(u8::from(i == j))
+        });
+        let determinant =
+            hessian.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
+        let sides = self.model.one_sided() as f64 * std::f64::consts::LN_2;
+        -0.5 * self.chi2() / dispersion - prior - 0.5 * determinant + sides
+    }
+}
+
+fn pick(stack: &Stack, places: &[usize]) -> Stack {
+    places.iter().map(|place| stack[*place].clone()).collect()
+}
+
+/// How long a fit may take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// One Jacobian, some steps: good enough for a ranking. The Jacobian of the result is Broyden's.
+    Quick,
+    /// A fresh Jacobian where the quick one ends, and steps until nothing is to be gained.
+    Full,
+}
+
+/// Where a fit begins.
+#[derive(Clone, Debug)]
+pub struct Begin {
+    /// Coordinates.
+    pub x: Vec<f64>,
+    /// Residuals there, not white, where known.
+    pub raw: Option<Vec<Vec<f64>>>,
+    /// Derivatives there or nearby of the first coordinates, as far as known.
+    pub jacobian: Vec<Stack>,
+}
+
+impl Begin {
+    /// At `x`, of which nothing is known.
+    #[must_use]
+    pub fn at(x: &[f64]) -> Self {
+        Self { x: x.to_vec(), raw: None, jacobian: Vec::new() }
+    }
+}
+
+/// Fits a model.
+#[must_use]
+pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
+    let mut x = begin.x;
+    let mut raw = begin.raw.unwrap_or_else(|| study.raw(&model.hypothesis(&x)));
+    let mut residuals = study.white(&raw);
+    let mut jacobian = begin.jacobian;
+    complete(study, &model, &x, &residuals, &mut jacobian);
+    let rounds = match effort {
+        Effort::Quick => 1,
+        Effort::Full => 3,
+    };
+    for round in 0..rounds {
+        if round > 0 {
+            jacobian = derivatives(study, &model, &x, &residuals);
+        }
+        let mut damping = 1e-3;
+        let mut moved = false;
+        for _ in 0..STEPS {
+            let Some(step) = step(&model, &x, &residuals, &jacobian, damping) else { break };
+            // A promise that a fresh Jacobian makes is worth more than one of an old one.
+            if step.promise < WORTHWHILE || (!moved && round > 0 && step.promise < 6.0 * WORTHWHILE) {
+                break;
+            }
+            let next: Vec<f64> = x.iter().zip(step.delta.iter()).map(|(x, d)| x + d).collect();
+            let found_raw = study.raw(&model.hypothesis(&next));
+            let found = study.white(&found_raw);
+            let gain = cost(&x, &residuals) - cost(&next, &found);
+            broyden(&mut jacobian, &residuals, &found, &step.delta);
+            moved = true;
+            if gain > 0.0 {
+                (x, raw, residuals) = (next, found_raw, found);
+                damping = (damping * 0.2).max(1e-6);
+            } else {
+                damping = (damping * 20.0).min(1e6);
+            }
+        }
+        if round > 0 && !moved {
+            return Fit { model, x, raw, residuals, jacobian };
+        }
+    }
+    if effort == Effort::Full {
+        jacobian = derivatives(study, &model, &x, &residuals);
+    }
+    Fit { model, x, raw, residuals, jacobian }
+}
+
+/// −ln posterior but for a constant.
+fn cost(x: &[f64], residuals: &Stack) -> f64 {
+    0.5 * chi2(residuals) + 0.5 * x.iter().map(|x| x * x).sum::<f64>()
+}
+
+/// Finite differences at `x`.
+fn derivatives(study: &Study, model: &Model, x: &[f64], residuals: &Stack) -> Vec<Stack> {
+    let mut jacobian = Vec::new();
+    complete(study, model, x, residuals, &mut jacobian);
+    jacobian
+}
+
+/// Finite differences at `x` for the coordinates that have none yet.
+fn complete(study: &Study, model: &Model, x: &[f64], residuals: &Stack, jacobian: &mut Vec<Stack>) {
+    for index in jacobian.len()..x.len() {
+        let step = model.step(x, index);
+        let mut moved = x.to_vec();
+        moved[index] += step;
+        jacobian.push(difference(&study.white(&study.raw(&model.hypothesis(&moved))), residuals, step));
+    }
+}
+
+struct Step {
+    delta: DVector<f64>,
+    /// What the linear model expects to gain in ln posterior.
+    promise: f64,
+}
+
+/// The damped Gauss–Newton step within the ranges: coordinates that it would push over a border stay there.
+fn step(model: &Model, x: &[f64], residuals: &Stack, jacobian: &[Stack], damping: f64) -> Option<Step> {
+    let n = x.len();
+    let gram = DMatrix::from_fn(n, n, |i, j| dot(&jacobian[i], &jacobian[j]) + f64::from(u8::from(i == j)));
+    let slope = DVector::from_fn(n, |i, _| dot(&jacobian[i], residuals) + x[i]);
+    let mut free: Vec<usize> = (0..n).collect();
+    let mut delta = DVector::zeros(n);
+    loop {
+        let m = free.len();
+        if m == 0 {
+            return None;
+        }
+        let a = DMatrix::from_fn(m, m, |i, j| {
+            let value = gram[(free[i], free[j])];
+            if i == j { value * (1.0 + damping) } else { value }
+        });
+        // What was held at a border moves the others' optimum.
+        let b = DVector::from_fn(m, |i, _| {
+            let held: f64 = (0..n).filter(|j| !free.contains(j)).map(|j| gram[(free[i], j)] * delta[j]).sum();
+            -(slope[free[i]] + held)
+        });
+        let solution = a.cholesky()?.solve(&b);
+        let mut worst = None;
+        for (i, index) in free.iter().enumerate() {
+            let [low, high] = model.range(*index);
+            let target = x[*index] + solution[i];
+            if target < low || target > high {
+                let over = (low - target).max(target - high);
+                if worst.is_none_or(|(_, _, most)| over > most) {
+                    worst = Some((*index, target.clamp(low, high) - x[*index], over));
+                }
+            }
+        }
+        match worst {
+            Some((index, held, _)) => {
+                delta[index] = held;
+                free.retain(|other| *other != index);
+                if free.is_empty() {
+                    break;
+                }
+            }
+            None => {
+                for (i, index) in free.iter().enumerate() {
+                    delta[*index] = solution[i];
+                }
+                break;
+            }
+        }
+    }
+    let promise = -(slope.dot(&delta) + 0.5 * (delta.transpose() * &gram * &delta)[(0, 0)]);
+    Some(Step { delta, promise })
+}
+
+/// The smallest change of the Jacobian that explains what a step did.
+fn broyden(jacobian: &mut [Stack], before: &Stack, after: &Stack, delta: &DVector<f64>) {
+    let length = delta.norm_squared();
+    if length == 0.0 {
+        return;
+    }
+    for place in 0..before.len() {
+        let mut surprise = &after[place] - &before[place];
+        for (column, d) in jacobian.iter().zip(delta.iter()) {
+            surprise.axpy(-d, &column[place], 1.0);
+        }
+        for (column, d) in jacobian.iter_mut().zip(delta.iter()) {
+            column[place].axpy(d / length, &surprise, 1.0);
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Intervals of fitted parameters, by a bootstrap over episodes.
+//!
+//! Each resample takes as many episodes as there are, with replacement, and makes one Gauss–Newton step from the fit. Laplace's intervals are
+//! too narrow where residuals are not as white as they should be; episodes are independent whatever happens within them.
+
+use nalgebra::{DMatrix, DVector};
+use pomdp::{Purpose, Seed};
+use rand_distr::{Distribution as _, Uniform};
+
+use crate::fit::Fit;
+
+/// Resamples.
+const RESAMPLES: usize = 500;
+
+/// Coordinates of the resamples, each as long as the fit's.
+#[must_use]
+pub fn bootstrap(fit: &Fit, seed: u64) -> Vec<Vec<f64>> {
+    let (n, episodes) = (fit.x.len(), fit.residuals.len());
+    if n == 0 || episodes == 0 {
+        return Vec::new();
+    }
+    let grams: Vec<DMatrix<f64>> =
+        (0..episodes).map(|t| DMatrix::from_fn(n, n, |i, j| fit.jacobian[i][t].dot(&fit.jacobian[j][t]))).collect();
+    let slopes: Vec<DVector<f64>> =
+        (0..episodes).map(|t| DVector::from_fn(n, |i, _| fit.jacobian[i][t].dot(&fit.residuals[t]))).collect();
+    // What is left of the slope at the optimum is the solver's grain, not the data's.
+    let mean: DVector<f64> = slopes.iter().sum::<DVector<f64>>() + DVector::from_column_slice(&fit.x);
+    let mut rng = Seed(seed).stream(Purpose::Statistics, 0);
+    let Ok(pick) = Uniform::new(0, episodes) else { return Vec::new() };
+    (0..RESAMPLES)
+        .map(|_| {
+            let (mut gram, mut slope) = (DMatrix::identity(n, n), -&mean);
+            slope += DVector::from_column_slice(&fit.x);
+            for _ in 0..episodes {
+                let t = pick.sample(&mut rng);
+                gram += &grams[t];
+                slope += &slopes[t];
+            }
+            let delta = gram.cholesky().map_or_else(|| DVector::zeros(n), |c| -c.solve(&slope));
+            fit.x.iter().zip(delta.iter()).map(|(x, d)| x + d).collect()
+        })
+        .collect()
+}
+
+/// The middle 90 % of values.
+///
+/// # Panics
+///
+/// If there are none.
+#[must_use]
+pub fn middle_90(mut values: Vec<f64>) -> [f64; 2] {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
+    [at(0.05), at(0.95)]
+}

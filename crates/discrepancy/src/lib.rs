@@ -1,0 +1,79 @@
+//! Finds where simulation and measurement disagree, names the missing effect, adds it to the model and proves it.
+//!
+//! # Method
+//!
+//! 1. A [`Trial`](trial::Trial) is an episode of the log: what a simulation starts from, and what it is compared with. Episodes run freely from
+//!    their first row, driven by the logged commands.
+//! 2. The null hypothesis is the nominal model with its uncertain numbers re-tuned within their priors ([`nominal`]).
+//! 3. A right model's residuals are not white: solvers and starts differ, and such errors last for the rest of an episode. Simulations with other
+//!    solver settings and other starts say what they look like; a [`whitener`] takes them out.
+//! 4. Every effect of the catalogue gets one linear step beside re-tuning ([`screen`]); what promises most is fitted ([`fit`]), first to a part of the
+//!    episodes, then to all.
+//! 5. An effect is named if its ln evidence beats re-tuning's by a margin and held-out episodes agree ([`diagnosis`]). Then the search goes on for
+//!    another one beside it.
+//! 6. [`report`]: where ([`locate`]), what, how sure ([`interval`]), before and after, what to record next ([`separate`]).
+//!
+//! The same log, seed and version give the same answer, whatever the number of threads.
+
+pub mod candidate;
+pub mod diagnosis;
+mod error;
+pub mod fit;
+pub mod interval;
+pub mod locate;
+pub mod model;
+pub mod model_file;
+pub mod noise;
+pub mod nominal;
+mod page;
+pub mod report;
+pub mod screen;
+pub mod separate;
+pub mod simulator;
+pub mod study;
+pub mod trial;
+pub mod whitener;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use measured_log::{Axis, Channel, Log, Robot};
+use physics_model::rig::RigTool;
+use scenario::{Problem, Selection, find_root};
+
+pub use diagnosis::{Diagnosis, Settings, diagnose};
+pub use error::Error;
+pub use model_file::ModelFile;
+pub use nominal::Nominal;
+pub use page::page;
+pub use report::{Report, Verdict};
+
+/// What moves by command in a log.
+///
+/// # Errors
+///
+/// [`Error::Scenario`] where the arm's description cannot be read; [`Error::Model`] for a tool without a radius.
+pub fn rig_tool(log: &Log, root: Option<&Path>) -> Result<RigTool, Error> {
+    let name = match log.header.robot {
+        Robot::Sawyer => "sawyer",
+        Robot::Jaco => "jaco",
+        Robot::None => {
+            let has = |channel: Channel| log.episodes.iter().any(|episode| episode.channels.contains_key(&channel));
+            if !has(Channel::Command(Axis::X)) && !has(Channel::Tool(Axis::X)) {
+                return Ok(RigTool::None);
+            }
+            let radius_m = log.header.tool_radius_m;
+            let missing = || Error::Model {
+                reason: "key `tool_radius_m`: expected the radius of the ball that is the tool".into(),
+            };
+            return Ok(RigTool::Ball { radius_m: radius_m.ok_or_else(missing)? });
+        }
+    };
+    let root = match root {
+        Some(root) => root.to_path_buf(),
+        None => find_root(Path::new("."))?,
+    };
+    let selection = Selection { robot: name.into(), domain: "D1".into(), ..Selection::new(&root) };
+    let problem = Problem::assemble(&selection.load()?, &root)?;
+    Ok(RigTool::Arm(Arc::new(problem.model.robot().clone())))
+}

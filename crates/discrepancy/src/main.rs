@@ -1,0 +1,108 @@
+//! `cargo xtask diagnose`: where simulation and measurement disagree, and which effect is missing.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Parser;
+use discrepancy::{Error, ModelFile, Nominal, Report, Settings, diagnose, page, rig_tool};
+use whole_file::Existing;
+
+/// Finds where simulation and measurement disagree, names the missing effect, adds it to the model and shows the gap shrink.
+#[derive(Debug, Parser)]
+#[command(name = "diagnose", version)]
+struct Arguments {
+    /// Folder of the log: log.toml with samples.csv or samples.parquet (docs/measured-log.md).
+    #[arg(long)]
+    measured: PathBuf,
+    /// Model to begin with instead of the log's nominal one: the model.toml of an earlier diagnosis.
+    #[arg(long)]
+    model: Option<PathBuf>,
+    /// Folder for report.json, report.html and model.toml [default: runs/diagnose/NAME of the log's folder].
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Seed of the hold-out split and of the bootstrap.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Worker threads [default: all cores]; the answer does not depend on it.
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Prints report.json.
+    #[arg(long)]
+    json: bool,
+    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            // 2 is bad input; a disk that refuses is a failure.
+            if let Error::Write { .. } | Error::Folder { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
+        }
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "the report says how long it took; nothing depends on it")]
+fn run(arguments: &Arguments) -> Result<(), Error> {
+    let started = Instant::now();
+    if let Some(threads) = arguments.threads {
+        // Fails where a pool exists already: not here.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
+    let log = measured_log::read(&arguments.measured)?;
+    let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
+    if let Some(path) = &arguments.model {
+        ModelFile::read(path)?.apply(&mut nominal)?;
+    }
+    let settings = Settings { seed: arguments.seed, ..Settings::default() };
+    let name = arguments.measured.display().to_string();
+    let diagnosis = diagnose(&log, &name, &nominal, &settings)?;
+    let report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
+    let json =
+        serde_json::to_string_pretty(&report).map_err(|error| Error::Model { reason: error.to_string() })? + "\n";
+    let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.measured));
+    std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
+    let model = ModelFile::new(&nominal, &diagnosis, &report).to_toml()?;
+    for (file, text) in [("model.toml", &model), ("report.html", &page(&name, &report)), ("report.json", &json)] {
+        whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
+    }
+    if arguments.json {
+        print!("{json}");
+    } else {
+        print_summary(&report, &out);
+    }
+    Ok(())
+}
+
+fn default_folder(measured: &Path) -> PathBuf {
+    let name = measured.canonicalize().ok().and_then(|path| path.file_name().map(PathBuf::from));
+    Path::new("runs/diagnose").join(name.unwrap_or_else(|| "log".into()))
+}
+
+fn print_summary(report: &Report, out: &Path) {
+    println!("{}", report.summary);
+    for effect in &report.effects {
+        println!("  {} (confidence {:.2}): {}", effect.name, effect.confidence, effect.description);
+        for value in &effect.parameters {
+            let [low, high] = value.interval90;
+            println!("    {} = {:.4} {} (90 %: {low:.4} to {high:.4})", value.key, value.value, value.unit);
+        }
+    }
+    if report.confusion_set.len() > 1 {
+        println!("  not told apart: {}", report.confusion_set.join(", "));
+    }
+    if let Some(description) = &report.description {
+        println!("  what is left: {description}");
+    }
+    for cell in report.located.iter().take(3).filter(|cell| cell.share > 0.0) {
+        let (channel, phase) = (cell.channel.name(), cell.phase.name());
+        println!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
+    }
+    println!("  next: {}", report.next_experiment);
+    println!("{} simulated episodes, {:.0} s; {}", report.rollouts, report.seconds, out.join("report.html").display());
+}

@@ -1,0 +1,243 @@
+//! The nominal model of a log: what re-tuning may change, and within which prior.
+//!
+//! Every number of `log.toml` that is given as `{ mean, stddev }` becomes a coordinate z with prior N(0, 1): value = mean · exp(z · stddev / mean)
+//! for what is positive (mass, friction, lengths, inertia, restitution), mean + z · stddev for what has a sign (centre of mass, height).
+
+use std::sync::Arc;
+
+use measured_log::{Header, Number, Shape};
+use physics_model::config::{ObstacleMobility, WorldConfig};
+use physics_model::rig::{Prism, Rig, RigObject, RigShape, RigTool};
+use physics_model::{EffectConfig, ObjectShape};
+
+use crate::error::Error;
+
+/// Engine step, s, at most.
+const LONGEST_STEP_SECS: f64 = 1.0 / 60.0;
+/// Friction of tool and object where the log does not say.
+const TOOL_FRICTION: f64 = 0.2;
+
+/// How exactly the engine solves. Variants of it show how far its answers can be trusted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Engine {
+    /// Engine steps a tick, times this.
+    pub refinement: u32,
+    /// Solver iterations of an engine step.
+    pub solver_iterations: u32,
+    /// Natural frequency of contacts, Hz.
+    pub contact_frequency_hz: f64,
+    /// Damping ratio of contacts.
+    pub contact_damping_ratio: f64,
+    /// Whether what is pushed bears on four fixed points (see [`RigObject::on_points`]): without them the yaw of a cylinder is a gamble.
+    pub on_points: bool,
+}
+
+impl Default for Engine {
+    fn default() -> Self {
+        // The planner's contacts (scenarios/base.toml), solved with four iterations where the planner can afford two.
+        Self {
+            refinement: 1,
+            solver_iterations: 4,
+            contact_frequency_hz: 60.0,
+            contact_damping_ratio: 5.0,
+            on_points: true,
+        }
+    }
+}
+
+/// A number that re-tuning may change.
+#[derive(Clone, Debug)]
+pub struct Tunable {
+    /// Key in `log.toml`.
+    pub key: String,
+    /// Prior mean.
+    pub mean: f64,
+    /// Prior standard deviation.
+    pub stddev: f64,
+    positive: bool,
+    place: Place,
+}
+
+impl Tunable {
+    /// Value at a coordinate.
+    #[must_use]
+    pub fn value(&self, z: f64) -> f64 {
+        if self.positive { self.mean * (z * self.stddev / self.mean).exp() } else { self.mean + z * self.stddev }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Place {
+    TableHeight,
+    TableFriction,
+    ToolFriction,
+    Mass,
+    Com(usize),
+    Size(usize),
+    Inertia(usize),
+    Restitution,
+}
+
+/// The nominal model.
+#[derive(Clone, Debug)]
+pub struct Nominal {
+    header: Header,
+    tool: RigTool,
+    prism: Option<Arc<Prism>>,
+    /// What re-tuning may change, in the order of the coordinates.
+    pub tunables: Vec<Tunable>,
+    /// Effects that the model already has.
+    pub effects: Vec<EffectConfig>,
+}
+
+impl Nominal {
+    /// Of a log's header. `tool`: what moves by command.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Model`] for an outline that is no prism.
+    pub fn new(header: &Header, tool: RigTool) -> Result<Self, Error> {
+        let prism = match &header.object.shape {
+            Shape::Prism { outline_m, height_m, feet_m } => {
+                let prism = Prism::new(outline_m.clone(), height_m.mean(), feet_m.clone());
+                Some(Arc::new(prism.map_err(|error| Error::Model { reason: error.to_string() })?))
+            }
+            _ => None,
+        };
+        let mut nominal = Self { header: header.clone(), tool, prism, tunables: Vec::new(), effects: Vec::new() };
+        nominal.tunables = nominal.uncertain();
+        Ok(nominal)
+    }
+
+    fn uncertain(&self) -> Vec<Tunable> {
+        let header = &self.header;
+        let mut all = Vec::new();
+        let mut add = |key: String, number: Number, positive: bool, place: Place| {
+            if let Number::Uncertain { mean, stddev } = number {
+                all.push(Tunable { key, mean, stddev, positive, place });
+            }
+        };
+        add("table.height_m".into(), header.table.height_m, false, Place::TableHeight);
+        add("table.friction".into(), header.table.friction, true, Place::TableFriction);
+        if let Some(friction) = header.tool_friction {
+            add("tool_friction".into(), friction, true, Place::ToolFriction);
+        }
+        let object = &header.object;
+        add("object.mass_kg".into(), object.mass_kg, true, Place::Mass);
+        for (i, com) in object.com_m.iter().enumerate() {
+            add(format!("object.com_m[{i}]"), *com, false, Place::Com(i));
+        }
+        for (i, size) in sizes(&object.shape).into_iter().enumerate() {
+            add(format!("object.size_m[{i}]"), size, true, Place::Size(i));
+        }
+        for (i, inertia) in object.inertia_kgm2.iter().flatten().enumerate() {
+            add(format!("object.inertia_kgm2[{i}]"), *inertia, true, Place::Inertia(i));
+        }
+        if let Some(restitution) = object.restitution {
+            add("object.restitution".into(), restitution, true, Place::Restitution);
+        }
+        all
+    }
+
+    /// The log's header.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Whether something moves by command.
+    #[must_use]
+    pub fn has_tool(&self) -> bool {
+        !matches!(self.tool, RigTool::None)
+    }
+
+    /// Whether the object rolls.
+    #[must_use]
+    pub fn rolls(&self) -> bool {
+        matches!(self.header.object.shape, Shape::Sphere { .. })
+    }
+
+    /// The arm's joints.
+    #[must_use]
+    pub fn joints(&self) -> usize {
+        usize::from(self.header.robot.joints())
+    }
+
+    fn value(&self, z: &[f64], place: Place, number: Number) -> f64 {
+        match self.tunables.iter().position(|tunable| tunable.place == place) {
+            Some(index) => self.tunables[index].value(z[index]),
+            None => number.mean(),
+        }
+    }
+
+    /// The rig with coordinates `z`.
+    #[must_use]
+    pub fn rig(&self, z: &[f64], engine: &Engine) -> Rig {
+        let header = &self.header;
+        let steps = (header.period_secs / LONGEST_STEP_SECS - 1e-9).ceil().max(1.0) as u32 * engine.refinement;
+        let tool_friction = match header.tool_friction {
+            Some(number) => self.value(z, Place::ToolFriction, number),
+            None => TOOL_FRICTION,
+        };
+        let world = WorldConfig {
+            control_period_secs: header.period_secs / f64::from(steps),
+            control_steps: 1,
+            solver_iterations: engine.solver_iterations,
+            contact_frequency_hz: engine.contact_frequency_hz,
+            contact_damping_ratio: engine.contact_damping_ratio,
+            table_height_m: self.value(z, Place::TableHeight, header.table.height_m),
+            gravity_mps2: header.gravity_mps2,
+            tool_friction,
+            obstacle_friction: 0.5,
+            arm_stiffness_npm: 50_000.0,
+            restitution: 0.0,
+            obstacle_mobility: ObstacleMobility::Movable,
+        };
+        Rig { world, tick_steps: steps, tool: self.tool.clone() }
+    }
+
+    /// The object with coordinates `z` and a known weight.
+    ///
+    /// # Panics
+    ///
+    /// Never: a nominal of a prism has one.
+    #[must_use]
+    pub fn object(&self, z: &[f64], added_mass_kg: f64, engine: &Engine) -> RigObject {
+        let object = &self.header.object;
+        let size = |i: usize, number: Number| self.value(z, Place::Size(i), number);
+        let solid = |shape, size_m| RigShape::Solid { shape, size_m };
+        let shape = match (&object.shape, &self.prism) {
+            (Shape::Prism { .. }, Some(prism)) => RigShape::Prism(prism.clone()),
+            (Shape::Box { size_m }, _) => solid(ObjectShape::Box, std::array::from_fn(|i| size(i, size_m[i]))),
+            (Shape::Cylinder { radius_m, height_m }, _) => {
+                solid(ObjectShape::Cylinder, [size(0, *radius_m), size(1, *height_m), 0.0])
+            }
+            (Shape::Sphere { radius_m }, _) => solid(ObjectShape::Sphere, [size(0, *radius_m), 0.0, 0.0]),
+            (Shape::Prism { .. }, None) => unreachable!("a nominal with a prism has one"),
+        };
+        RigObject {
+            shape,
+            mass_kg: self.value(z, Place::Mass, object.mass_kg),
+            com_m: std::array::from_fn(|i| self.value(z, Place::Com(i), object.com_m[i])),
+            friction: self.value(z, Place::TableFriction, self.header.table.friction),
+            inertia_kgm2: object
+                .inertia_kgm2
+                .map(|inertia| std::array::from_fn(|i| self.value(z, Place::Inertia(i), inertia[i]))),
+            restitution: object.restitution.map(|number| self.value(z, Place::Restitution, number)),
+            added_mass_kg,
+            // What is thrown tumbles.
+            on_points: engine.on_points && self.has_tool(),
+        }
+    }
+}
+
+/// The lengths of a shape that may be uncertain, in the order of `size_m`.
+fn sizes(shape: &Shape) -> Vec<Number> {
+    match shape {
+        Shape::Box { size_m } => size_m.to_vec(),
+        Shape::Cylinder { radius_m, height_m } => vec![*radius_m, *height_m],
+        Shape::Sphere { radius_m } => vec![*radius_m],
+        // Its outline is fixed.
+        Shape::Prism { .. } => Vec::new(),
+    }
+}

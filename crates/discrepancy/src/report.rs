@@ -1,0 +1,288 @@
+//! What a diagnosis says: the contract of `report.json`.
+
+use physics_model::EffectKind;
+use serde::Serialize;
+
+use crate::diagnosis::{Diagnosis, Settings};
+use crate::interval::{bootstrap, middle_90};
+use crate::locate::Cell;
+use crate::separate;
+
+/// The verdict.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Effects of the catalogue explain what the nominal model lacks.
+    Effect,
+    /// The nominal model, re-tuned, lacks nothing that shows.
+    None,
+    /// Something is missing that the catalogue has not.
+    Unknown,
+}
+
+/// A named effect.
+#[derive(Clone, Debug, Serialize)]
+pub struct NamedEffect {
+    /// Name in the catalogue.
+    pub name: &'static str,
+    /// What it does, in a line.
+    pub description: &'static str,
+    /// Probability among the fitted rivals and the nominal model.
+    pub confidence: f64,
+    /// Gain in ln evidence over the model without it.
+    pub log_evidence: f64,
+    /// Fitted values.
+    pub parameters: Vec<Value>,
+}
+
+/// A value with its interval.
+#[derive(Clone, Debug, Serialize)]
+pub struct Value {
+    /// Name, without its unit.
+    pub name: String,
+    /// Key in scenario and model files.
+    pub key: String,
+    /// Unit.
+    pub unit: &'static str,
+    /// Value.
+    pub value: f64,
+    /// 90 % interval.
+    pub interval90: [f64; 2],
+}
+
+/// A rival of the first round.
+#[derive(Clone, Debug, Serialize)]
+pub struct RankedEffect {
+    /// Name.
+    pub name: &'static str,
+    /// Gain in ln evidence.
+    pub log_evidence: f64,
+    /// Held-out mean square with it.
+    pub heldout: f64,
+}
+
+/// Held-out comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct Heldout {
+    /// Mean square of the white residuals of the re-tuned nominal model.
+    pub before: f64,
+    /// With the named effects.
+    pub after: f64,
+    /// What noise alone leaves.
+    pub noise_floor: f64,
+    /// (before − after) / (before − floor); 1 where there is nothing to close.
+    pub closed_fraction: f64,
+    /// Unit of the three.
+    pub unit: &'static str,
+    /// Of each held-out episode: number in the log, before, after.
+    pub episodes: Vec<(u64, f64, f64)>,
+}
+
+/// A re-tuned value of the nominal model.
+#[derive(Clone, Debug, Serialize)]
+pub struct Retuned {
+    /// Key in `log.toml`.
+    pub key: String,
+    /// Prior mean and standard deviation.
+    pub prior: [f64; 2],
+    /// Value.
+    pub value: f64,
+    /// 90 % interval.
+    pub interval90: [f64; 2],
+}
+
+/// `report.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version of the contract.
+    pub version: u32,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// A sentence.
+    pub summary: String,
+    /// Named effects, in the order in which they were accepted.
+    pub effects: Vec<NamedEffect>,
+    /// Names that the data do not tell apart.
+    pub confusion_set: Vec<&'static str>,
+    /// Fitted rivals of the first round.
+    pub ranking: Vec<RankedEffect>,
+    /// Where the re-tuned nominal model disagrees.
+    pub located: Vec<Cell>,
+    /// Where the accepted model still does.
+    pub remaining: Vec<Cell>,
+    /// For a gap that the catalogue does not explain: where it acts.
+    pub description: Option<String>,
+    /// Held-out comparison.
+    pub heldout: Heldout,
+    /// The nominal model, re-tuned.
+    pub retuned: Vec<Retuned>,
+    /// What to record next to tell the confusion set apart.
+    pub next_experiment: String,
+    /// Simulated episodes.
+    pub rollouts: usize,
+    /// Duration, s.
+    pub seconds: f64,
+}
+
+/// Held-out mean square of noise: residuals are standardised.
+const NOISE_FLOOR: f64 = 1.0;
+/// A model that closes more of the gap than this explains it, whatever the solver's errors leave.
+const CLOSED: f64 = 0.95;
+
+impl Report {
+    /// What a diagnosis says.
+    #[must_use]
+    pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
+        let count = diagnosis.heldout_count.max(1) as f64;
+        let mean = |sums: &[f64]| sums.iter().sum::<f64>() / count;
+        let (before, after) = (mean(&diagnosis.heldout[0]), mean(&diagnosis.heldout[1]));
+        let gap = before - NOISE_FLOOR;
+        let closed_fraction = if gap > 0.0 { ((before - after) / gap).min(1.0) } else { 1.0 };
+        let unexplained = after > settings.unexplained && closed_fraction < CLOSED;
+        let effects = effects(diagnosis, settings);
+        let verdict = match (unexplained, effects.is_empty()) {
+            (true, _) => Verdict::Unknown,
+            (false, true) => Verdict::None,
+            (false, false) => Verdict::Effect,
+        };
+        let confusion_set = confusion_set(diagnosis, settings, &effects);
+        let summary = summary(verdict, &effects, before, after);
+        let description = (verdict == Verdict::Unknown).then(|| describe(&diagnosis.remaining));
+        Self {
+            version: 1,
+            verdict,
+            summary,
+            next_experiment: separate::next_experiment(verdict, &confusion_set),
+            confusion_set,
+            ranking: ranking(diagnosis, count),
+            located: diagnosis.located.clone(),
+            remaining: diagnosis.remaining.clone(),
+            description,
+            heldout: Heldout {
+                before,
+                after,
+                noise_floor: NOISE_FLOOR,
+                closed_fraction,
+                unit: "chi2 per sample",
+                episodes: diagnosis.heldout_episodes.clone(),
+            },
+            retuned: retuned(diagnosis, settings),
+            effects,
+            rollouts: diagnosis.rollouts,
+            seconds,
+        }
+    }
+}
+
+fn effects(diagnosis: &Diagnosis, settings: &Settings) -> Vec<NamedEffect> {
+    let model = &diagnosis.model.model;
+    let samples = bootstrap(&diagnosis.model, settings.seed);
+    let fitted = model.hypothesis(&diagnosis.model.x).effects;
+    let resampled: Vec<_> = samples.iter().map(|x| model.hypothesis(x).effects).collect();
+    (model.parts.iter().enumerate())
+        .map(|(place, part)| {
+            let kind = part.kind();
+            let round = &diagnosis.rounds[place];
+            let gain = round.rivals[0].gain;
+            let rest: f64 =
+                round.rivals.iter().skip(1).map(|rival| (rival.gain - gain).exp()).sum::<f64>() + (-gain).exp();
+            let parameters = (part.coordinates.iter())
+                .map(|coordinate| {
+                    let parameter = &kind.parameters()[coordinate.index];
+                    let values = resampled.iter().map(|effects| effects[place].values()[coordinate.index]).collect();
+                    Value {
+                        name: bare(parameter.name).into(),
+                        key: parameter.name.into(),
+                        unit: parameter.unit,
+                        value: fitted[place].values()[coordinate.index],
+                        interval90: middle_90(values),
+                    }
+                })
+                .collect();
+            NamedEffect {
+                name: kind.name(),
+                description: kind.description(),
+                confidence: 1.0 / (1.0 + rest),
+                log_evidence: gain,
+                parameters,
+            }
+        })
+        .collect()
+}
+
+/// A key without the unit at its end.
+fn bare(key: &str) -> &str {
+    match key.rsplit_once('_') {
+        Some((name, unit)) if !matches!(unit, "x" | "y" | "z" | "ratio" | "share" | "0" | "1" | "2") => name,
+        _ => key,
+    }
+}
+
+fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEffect]) -> Vec<&'static str> {
+    let Some(first) = effects.first() else { return Vec::new() };
+    let round = &diagnosis.rounds[0];
+    let near = round.rivals.iter().filter(|rival| first.log_evidence - rival.gain < settings.confusion);
+    near.map(|rival| EffectKind::name(rival.kind())).collect()
+}
+
+fn ranking(diagnosis: &Diagnosis, count: f64) -> Vec<RankedEffect> {
+    let rivals = diagnosis.rounds.first().map(|round| round.rivals.as_slice()).unwrap_or_default();
+    rivals
+        .iter()
+        .map(|rival| RankedEffect {
+            name: rival.kind().name(),
+            log_evidence: rival.gain,
+            heldout: rival.heldout.iter().sum::<f64>() / count,
+        })
+        .collect()
+}
+
+fn retuned(diagnosis: &Diagnosis, settings: &Settings) -> Vec<Retuned> {
+    let samples = bootstrap(&diagnosis.model, settings.seed);
+    (diagnosis.tunables.iter().enumerate())
+        .map(|(index, tunable)| Retuned {
+            key: tunable.key.clone(),
+            prior: [tunable.mean, tunable.stddev],
+            value: tunable.value(diagnosis.model.x[index]),
+            interval90: middle_90(samples.iter().map(|x| tunable.value(x[index])).collect()),
+        })
+        .collect()
+}
+
+fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -> String {
+    let names: Vec<&str> = effects.iter().map(|effect| effect.name).collect();
+    let names = names.join(" and ");
+    match verdict {
+        Verdict::Effect => {
+            format!(
+                "The model lacks {names}: with it the held-out error falls from {before:.2} to {after:.2} (1 is noise)."
+            )
+        }
+        Verdict::None => {
+            format!("Re-tuned, the model lacks nothing that shows: held-out error {before:.2} (1 is noise).")
+        }
+        Verdict::Unknown if effects.is_empty() => {
+            format!(
+                "Something is missing that no effect of the catalogue explains: held-out error {before:.2} (1 is noise)."
+            )
+        }
+        Verdict::Unknown => format!(
+            "Something is missing that no effect of the catalogue explains; {names} comes nearest: held-out error {before:.2}, \
+             with it {after:.2} (1 is noise)."
+        ),
+    }
+}
+
+fn describe(remaining: &[Cell]) -> String {
+    let worst: Vec<String> = (remaining.iter().take(3))
+        .map(|cell| {
+            let (channel, phase) = (cell.channel.name(), cell.phase.name());
+            format!(
+                "{channel} during {phase} ({:.0} % of what is left, mean square {:.1})",
+                100.0 * cell.share,
+                cell.mean_square
+            )
+        })
+        .collect();
+    worst.join("; ")
+}

@@ -1,0 +1,204 @@
+//! Which effects could explain what the re-tuned nominal model leaves: one linear step for each.
+
+use nalgebra::{DMatrix, DVector};
+use physics_model::EffectKind;
+
+use crate::candidate::{Candidate, Coordinate};
+use crate::fit::Fit;
+use crate::study::{Stack, Study, chi2, difference, dot};
+
+/// Episodes that the screening looks at, at most.
+const EPISODES: usize = 12;
+/// How far from neutral, in units, the linear step is measured: far enough to stand out of the solver's grain.
+const REACH: f64 = 0.35;
+
+/// What a linear step says of a candidate.
+#[derive(Clone, Debug)]
+pub struct Promise {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// What ln evidence would gain.
+    pub gain: f64,
+    /// Coordinates to begin a fit from.
+    pub begin: Vec<f64>,
+}
+
+/// What was simulated for the screening: it serves again when an effect has been accepted.
+#[derive(Debug)]
+pub struct Screening {
+    /// Places in the study of the episodes that it looks at.
+    pub places: Vec<usize>,
+    columns: Vec<(Candidate, Columns)>,
+}
+
+/// Changes of residuals that are not white: what is white changes when errors are learnt anew.
+#[derive(Debug)]
+enum Columns {
+    /// Within reach of each strength.
+    Linear(Vec<Vec<Vec<f64>>>),
+    /// At the place to begin from: no small version exists.
+    Whole(Vec<Vec<f64>>),
+}
+
+impl Screening {
+    /// Simulates every candidate near the re-tuned nominal model.
+    #[must_use]
+    pub fn new(study: &Study, nominal: &Fit, candidates: &[Candidate]) -> Self {
+        let places = places(study, nominal);
+        let part = study.part(&places);
+        let hypothesis = nominal.model.hypothesis(&nominal.x);
+        let base = part.raw(&hypothesis);
+        let columns = candidates
+            .iter()
+            .map(|candidate| {
+                let change = |a: &[f64]| -> Vec<Vec<f64>> {
+                    let mut hypothesis = hypothesis.clone();
+                    hypothesis.effects.push(candidate.effect(a));
+                    let raw = part.raw(&hypothesis);
+                    let less = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - b).collect();
+                    raw.iter().zip(&base).map(less).collect()
+                };
+                let columns = match &candidate.begin {
+                    Some(begin) => Columns::Whole(change(begin)),
+                    None => Columns::Linear(
+                        candidate
+                            .strengths()
+                            .map(|index| {
+                                let mut a = vec![0.0; candidate.coordinates.len()];
+                                a[index] = reach(&candidate.coordinates[index]);
+                                change(&a)
+                            })
+                            .collect(),
+                    ),
+                };
+                (candidate.clone(), columns)
+            })
+            .collect();
+        Self { places, columns }
+    }
+
+    /// What each candidate would bring beside what `fit` has; the most promising first.
+    #[must_use]
+    pub fn promises(&self, study: &Study, fit: &Fit) -> Vec<Promise> {
+        let part = study.part(&self.places);
+        let Fit { x, raw, residuals, jacobian: tuning, .. } = fit.part(&self.places);
+        let moved = |change: &Vec<Vec<f64>>| -> Stack {
+            let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
+            part.white(&raw.iter().zip(change).map(sum).collect::<Vec<_>>())
+        };
+        // What was left out says as much again.
+        let share = fit.residuals.len() as f64 / self.places.len() as f64;
+        let mut promises: Vec<Promise> = (self.columns.iter())
+            .map(|(candidate, columns)| {
+                let (gain, begin) = match columns {
+                    Columns::Whole(change) => {
+                        let begin = candidate.begin.clone().unwrap_or_default();
+                        (0.5 * (chi2(&residuals) - chi2(&moved(change))) - begin.len() as f64, begin)
+                    }
+                    Columns::Linear(columns) => {
+                        let strengths: Vec<usize> = candidate.strengths().collect();
+                        let reach = |index: &usize| reach(&candidate.coordinates[*index]);
+                        let white: Vec<Stack> = (columns.iter().zip(&strengths))
+                            .map(|(change, index)| difference(&moved(change), &residuals, reach(index)))
+                            .collect();
+                        let (gain, solution) = linear(candidate, &strengths, &x, &residuals, &tuning, &white);
+                        let mut begin = vec![0.0; candidate.coordinates.len()];
+                        for (index, a) in strengths.iter().zip(&solution) {
+                            begin[*index] = *a;
+                        }
+                        (gain, begin)
+                    }
+                };
+                Promise { candidate: candidate.clone(), gain: gain * share, begin }
+            })
+            .collect();
+        promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        promises
+    }
+}
+
+/// The change of a strength that is simulated.
+fn reach(coordinate: &Coordinate) -> f64 {
+    if coordinate.range[1] >= REACH { REACH } else { -REACH }
+}
+
+/// The best of each kind, as many as asked for.
+#[must_use]
+pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
+    let mut kinds: Vec<EffectKind> = Vec::new();
+    let mut list = Vec::new();
+    for promise in promises {
+        if list.len() == count {
+            break;
+        }
+        if promise.gain > 0.0 && !kinds.contains(&promise.candidate.kind()) {
+            kinds.push(promise.candidate.kind());
+            list.push(promise.clone());
+        }
+    }
+    list
+}
+
+/// Episodes to look at: evenly over those sorted by how badly the nominal model fails them.
+fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..study.chosen.len()).collect();
+    order.sort_by(|a, b| nominal.residuals[*b].norm_squared().total_cmp(&nominal.residuals[*a].norm_squared()));
+    let count = order.len().min(EPISODES);
+    let mut places: Vec<usize> = (0..count).map(|i| order[i * order.len() / count]).collect();
+    places.sort_unstable();
+    places
+}
+
+/// What ln evidence gains by the strengths' columns beside re-tuning, and their best values, held to their ranges.
+fn linear(
+    candidate: &Candidate,
+    strengths: &[usize],
+    z: &[f64],
+    residuals: &Stack,
+    tuning: &[Stack],
+    columns: &[Stack],
+) -> (f64, Vec<f64>) {
+    let all: Vec<&Stack> = tuning.iter().chain(columns).collect();
+    let (k, n) = (tuning.len(), all.len());
+    let gram = DMatrix::from_fn(n, n, |i, j| dot(all[i], all[j]) + f64::from(u8::from(i == j)));
+    let slope = DVector::from_fn(n, |i, _| dot(all[i], residuals) + z.get(i).copied().unwrap_or(0.0));
+    let gain = |kept: &[usize], held: &DVector<f64>| -> Option<(f64, DVector<f64>)> {
+        let m = kept.len();
+        let a = DMatrix::from_fn(m, m, |i, j| gram[(kept[i], kept[j])]);
+        let b = DVector::from_fn(m, |i, _| {
+            -(slope[kept[i]] + (0..n).filter(|j| !kept.contains(j)).map(|j| gram[(kept[i], j)] * held[j]).sum::<f64>())
+        });
+        let cholesky = a.cholesky()?;
+        let mut delta = held.clone();
+        for (i, value) in kept.iter().zip(cholesky.solve(&b).iter()) {
+            delta[*i] = *value;
+        }
+        let cost = slope.dot(&delta) + 0.5 * (delta.transpose() * &gram * &delta)[(0, 0)];
+        Some((-cost - cholesky.l().diagonal().iter().map(|d| d.ln()).sum::<f64>(), delta))
+    };
+    let nothing = DVector::zeros(n);
+    let without = if k == 0 { 0.0 } else { gain(&(0..k).collect::<Vec<_>>(), &nothing).map_or(0.0, |(gain, _)| gain) };
+    let mut held = nothing.clone();
+    let mut kept: Vec<usize> = (0..n).collect();
+    let mut best = gain(&kept, &held);
+    // What leaves its range is held at the border.
+    if let Some((_, delta)) = &best {
+        let mut changed = false;
+        for (j, index) in strengths.iter().enumerate() {
+            let [low, high] = candidate.coordinates[*index].range;
+            let value = delta[k + j];
+            if value < low || value > high {
+                held[k + j] = value.clamp(low, high);
+                kept.retain(|i| *i != k + j);
+                changed = true;
+            }
+        }
+        if changed {
+            best = gain(&kept, &held);
+        }
+    }
+    match best {
+        Some((gain, delta)) => (gain - without, (0..strengths.len()).map(|j| delta[k + j]).collect()),
+        None => (0.0, vec![0.0; strengths.len()]),
+    }
+}

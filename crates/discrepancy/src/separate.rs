@@ -1,0 +1,73 @@
+//! What to record next: the experiment that tells confusable effects apart.
+
+use crate::report::Verdict;
+
+/// Pairs that logs confuse, and what separates them (catalogue).
+const PAIRS: &[(&str, &str, &str)] = &[
+    ("viscous_damping", "quadratic_drag", "push and release at three speeds: drag grows with the square of the speed"),
+    (
+        "table_tilt",
+        "constant_force",
+        "repeat pushes with a known added weight: tilt scales with mass, a constant force does not",
+    ),
+    (
+        "force_gain",
+        "time_base",
+        "let the object slide freely after a fast push: only the time base changes its deceleration",
+    ),
+    (
+        "force_gain",
+        "friction_level",
+        "weigh the object or add a known weight: the gain scales all forces, friction only the table's",
+    ),
+    (
+        "static_friction",
+        "stribeck_friction",
+        "start from rest by a slow ramp, then stop slowly: Stribeck shows at the end of a slide too",
+    ),
+    ("static_friction", "adhesion", "vary how long tool and object rest together, then pull away"),
+    ("static_friction", "backlash", "vary how long tool and object rest together, then reverse slowly"),
+    ("anisotropic_friction", "table_tilt", "push in eight directions: tilt has one period a turn, anisotropy two"),
+    ("friction_patch", "mass_leak", "repeat the same push elsewhere on the table"),
+    ("tether", "friction_patch", "begin at different places: a tether grows with distance"),
+    ("com_offset", "pressure_distribution", "push left and right of the middle, and spin the object"),
+    ("actuation_delay", "pose_delay", "look at when the force sets in: a late pose does not shift it"),
+    ("actuator_gain", "pose_scale", "compare with the joint encoders in free motion"),
+    ("pose_scale", "time_base", "read the height at rest: only a wrong scale changes it"),
+    (
+        "pose_rotation",
+        "table_tilt",
+        "carry the object at constant speed: a turned frame drifts in proportion to the way",
+    ),
+    ("force_bias", "wrist_payload", "read the force without contact while the tool accelerates or turns"),
+    ("force_bias", "force_drift", "read the force without contact for minutes"),
+    ("contact_compliance", "actuation_delay", "push a light and a heavy object"),
+    ("restitution", "contact_compliance", "hit at two speeds"),
+    ("arm_compliance", "actuator_gain", "move freely: compliance shows under load alone"),
+    (
+        "force_low_pass",
+        "contact_compliance",
+        "compare with the pose at contact: a slow force sensor does not move the object",
+    ),
+    ("viscous_damping", "friction_level", "push at two speeds: friction does not grow with speed"),
+];
+
+/// What to do next.
+#[must_use]
+pub fn next_experiment(verdict: Verdict, confusion_set: &[&str]) -> String {
+    let first = confusion_set.first();
+    for other in confusion_set.iter().skip(1) {
+        let pair = PAIRS.iter().find(|(a, b, _)| first == Some(a) && other == b || first == Some(b) && other == a);
+        if let Some((a, b, how)) = pair {
+            return format!("{a} or {b}: {how}.");
+        }
+    }
+    match (verdict, confusion_set) {
+        (Verdict::None, _) => "None needed; a designed set (eight directions, four speeds, known added weights) would show smaller effects.".into(),
+        (Verdict::Unknown, _) => {
+            "Repeat the worst episodes with one thing changed at a time: place, direction, speed, added weight, time.".into()
+        }
+        (Verdict::Effect, [_]) => "None needed to name it; more episodes narrow the intervals.".into(),
+        (Verdict::Effect, names) => format!("{}: a designed set with eight directions, four speeds and known added weights.", names.join(" or ")),
+    }
+}

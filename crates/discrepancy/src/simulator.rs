@@ -1,0 +1,117 @@
+//! Hypotheses against measured episodes: residuals by simulation.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use physics_model::effect::Effect;
+use physics_model::rig::{RigReading, RigStart};
+use physics_model::world::Wrench;
+use physics_model::{BodyState, EffectConfig};
+use rayon::prelude::*;
+
+use crate::nominal::{Engine, Nominal};
+use crate::trial::Trial;
+
+/// A model of what was measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hypothesis {
+    /// Coordinates of the nominal model's tunables.
+    pub z: Vec<f64>,
+    /// What the nominal model lacks.
+    pub effects: Vec<EffectConfig>,
+}
+
+/// A displacement of the start of every episode, in standard deviations of what is known of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Nudge {
+    /// Along base x, y (m) and about z (rad).
+    pub pose: [f64; 3],
+    /// Velocities along x, y, z.
+    pub linear: [f64; 3],
+    /// Angular velocities about x, y, z.
+    pub angular: [f64; 3],
+}
+
+/// Simulates episodes and counts them.
+#[derive(Debug)]
+pub struct Simulator<'a> {
+    /// The nominal model.
+    pub nominal: &'a Nominal,
+    /// The episodes.
+    pub trials: &'a [Trial],
+    rollouts: AtomicUsize,
+}
+
+impl<'a> Simulator<'a> {
+    /// Of the episodes of a log.
+    #[must_use]
+    pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
+        Self { nominal, trials, rollouts: AtomicUsize::new(0) }
+    }
+
+    /// Simulated episodes so far.
+    #[must_use]
+    pub fn rollouts(&self) -> usize {
+        self.rollouts.load(Ordering::Relaxed)
+    }
+
+    /// Residuals of the episodes `chosen` (see [`Trial::residuals`]), in parallel; the order is that of `chosen`.
+    #[must_use]
+    pub fn residuals(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, chosen: &[usize]) -> Vec<Vec<f64>> {
+        chosen.par_iter().map(|index| self.episode(hypothesis, engine, nudge, &self.trials[*index])).collect()
+    }
+
+    /// Simulated readings of an episode, the start first.
+    #[must_use]
+    pub fn readings(
+        &self,
+        hypothesis: &Hypothesis,
+        engine: &Engine,
+        nudge: Nudge,
+        trial: &Trial,
+    ) -> (RigReading, Vec<RigReading>) {
+        self.rollouts.fetch_add(1, Ordering::Relaxed);
+        let rig = self.nominal.rig(&hypothesis.z, engine);
+        let object = self.nominal.object(&hypothesis.z, trial.added_mass_kg, engine);
+        let effects: Vec<Box<dyn Effect>> =
+            self.nominal.effects.iter().chain(&hypothesis.effects).map(EffectConfig::build).collect();
+        let body = nudged(&trial.start, &trial.start_stddev, nudge);
+        let start = RigStart::of_episode(body, trial.tool_m);
+        // What went wrong on the way is as far from what was measured as the rest of the episode is.
+        let readings =
+            rig.run(&object, &effects, &start, &trial.commands).unwrap_or_else(|error| error.readings().to_vec());
+        let first = RigReading {
+            tool_m: trial.tool_m,
+            joints_rad: Default::default(),
+            wrench: Wrench::default(),
+            joint_torque_nm: Default::default(),
+            object: body,
+            hidden: Vec::new(),
+        };
+        (first, readings)
+    }
+
+    fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, trial: &Trial) -> Vec<f64> {
+        let (first, readings) = self.readings(hypothesis, engine, nudge, trial);
+        trial.residuals(&first, &readings)
+    }
+}
+
+fn nudged(start: &BodyState, stddev: &[f64; 4], nudge: Nudge) -> BodyState {
+    let mut body = *start;
+    let [position, orientation, linear, angular] = stddev;
+    for i in 0..2 {
+        body.position_m[i] += nudge.pose[i] * position;
+    }
+    for i in 0..3 {
+        body.linear_mps[i] += nudge.linear[i] * linear;
+        body.angular_rps[i] += nudge.angular[i] * angular;
+    }
+    let yaw = nudge.pose[2] * orientation;
+    if yaw != 0.0 {
+        let (sin, cos) = (0.5 * yaw).sin_cos();
+        let [x, y, z, w] = body.orientation;
+        // Turned about the base's z: (cos + sin k) q.
+        body.orientation = [cos * x - sin * y, cos * y + sin * x, cos * z + sin * w, cos * w - sin * z];
+    }
+    body
+}
