@@ -32,6 +32,8 @@ pub struct Context {
     pub forces: bool,
     /// Whether there is an arm with joints.
     pub joints: bool,
+    /// Whether torques at the wrist were measured.
+    pub wrist_torques: bool,
     /// Whether torques of joints were measured.
     pub joint_torques: bool,
 }
@@ -188,7 +190,7 @@ fn coordinates(base: &EffectConfig, context: &Context) -> Vec<Coordinate> {
 fn left_alone(kind: EffectKind, index: usize, context: &Context) -> bool {
     match kind {
         // Where a payload's centre is shows in torques alone.
-        EffectKind::WristPayload => index > 0,
+        EffectKind::WristPayload => index > 0 && !(context.wrist_torques || context.joint_torques),
         EffectKind::ContactCompliance => index == 1,
         // The centre of a sphere that stays where it is in the table's frame.
         EffectKind::ComOffset => index == 2 && context.theta.object.shape != ObjectShape::Sphere,
@@ -202,6 +204,7 @@ fn coordinate(kind: EffectKind, index: usize, parameter: &Parameter, value: f64,
     if !parameter.is_strength() {
         let unit = match (kind, parameter.unit) {
             (EffectKind::Tether, _) => 0.1,
+            (EffectKind::WristPayload, _) => 0.04,
             (_, "m") if parameter.name.ends_with("radius_m") => 0.02,
             (_, "m") => PLACE_M,
             (_, "rad") => 0.4,
@@ -265,6 +268,7 @@ mod tests {
             tool: true,
             forces: true,
             joints: true,
+            wrist_torques: true,
             joint_torques: true,
         }
     }

@@ -6,7 +6,8 @@ use physics_model::EffectKind;
 
 use crate::candidate::{Context, candidates};
 use crate::error::Error;
-use crate::fit::{Begin, Effort, Fit, fit};
+use crate::fit::{Begin, Effort, Fit, dispersion, fit};
+use crate::interval::bootstrap;
 use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::noise::NoiseLevels;
@@ -33,8 +34,9 @@ pub struct Settings {
     pub effects: usize,
     /// No further effect is looked for after this many simulated episodes.
     pub rollouts: usize,
-    /// Held-out sum of squares a residual above which the best model is not the whole story.
-    pub unexplained: f64,
+    /// Mean square of an episode's residuals above which the model does not explain it, and share of such episodes among all above which the model
+    /// is not the whole story.
+    pub unexplained: [f64; 2],
 }
 
 impl Default for Settings {
@@ -47,7 +49,7 @@ impl Default for Settings {
             threshold: 6.0,
             effects: 2,
             rollouts: 4000,
-            unexplained: 1.15,
+            unexplained: [1.3, 0.3],
         }
     }
 }
@@ -84,8 +86,8 @@ pub struct Round {
     pub rivals: Vec<Rival>,
     /// Sums of squares of the held-out episodes under the model that they were added to, with the same errors.
     pub before: Vec<f64>,
-    /// Variance of the residuals of the best.
-    pub dispersion: f64,
+    /// Variance of the residuals of each fitted episode under the model that explains it best.
+    pub dispersion: Vec<f64>,
 }
 
 /// What a diagnosis is made of.
@@ -103,6 +105,8 @@ pub struct Diagnosis {
     pub heldout_count: usize,
     /// Of each held-out episode: number in the log, mean squares of nominal and accepted model.
     pub heldout_episodes: Vec<(u64, f64, f64)>,
+    /// Mean squares of all episodes under the accepted model.
+    pub mean_squares: Vec<f64>,
     /// What re-tuning may change.
     pub tunables: Vec<Tunable>,
     /// Where the re-tuned nominal model disagrees.
@@ -159,6 +163,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let screening = Screening::new(&search.study, &null, &candidates(&context));
 
     let mut accepted = null.clone();
+    let counts: Vec<usize> = search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect();
     let (mut rounds, mut explained) = (Vec::new(), 0.0);
     while accepted.model.parts.len() < settings.effects {
         if simulator.rollouts() > settings.rollouts {
@@ -167,7 +172,9 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         let round = search.round(&screening, &accepted);
         // The errors of a solver grow with what it is asked to explain.
         let least = settings.threshold.max(SECOND_SHARE * explained);
-        let best = round.rivals.first().filter(|best| best.gain > least && agrees(best, &round));
+        let convinces =
+            |best: &&Rival| best.gain > least && agrees(best, &round, &counts) && lasts(&best.fit, settings.seed);
+        let best = round.rivals.first().filter(convinces);
         let best = best.map(|best| (best.gain, best.fit.clone()));
         rounds.push(round);
         match best {
@@ -183,6 +190,9 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
             (trial.id, before / count, after / count)
         })
         .collect();
+    let mean_squares = accepted.residuals.iter().map(|r| r.norm_squared() / r.len().max(1) as f64);
+    let mean_squares =
+        mean_squares.chain(heldout[1].iter().zip(&counts).map(|(sum, n)| sum / (*n).max(1) as f64)).collect();
     let chosen = &search.study.chosen;
     let located = locate(&simulator, chosen, &null, settings.seed);
     let remaining = if accepted.model.parts.is_empty() {
@@ -199,11 +209,14 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         heldout,
         heldout_count: search.kept.len(),
         heldout_episodes,
+        mean_squares,
         tunables: nominal.tunables.clone(),
         rollouts: simulator.rollouts(),
     })
 }
 
+/// Share of resamples in which a strength has to have the same sign.
+const SAME_SIGN: f64 = 0.95;
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.
 const LEAST_FITTED: usize = 4;
 /// What a further effect has to gain, as a share of what those before it did.
@@ -237,8 +250,10 @@ impl Search<'_> {
         let mut quick = self.quick(screening, base, &promises);
         // How large errors are is learnt where the model is nearly right.
         let mut base = base.clone();
+        let part = base.part(&screening.places);
+        let spread = dispersion(quick.iter().chain([&part]));
         if let Some(best) = quick.first()
-            && best.log_evidence(1.0) - base.part(&screening.places).log_evidence(1.0) > FAR
+            && best.log_evidence(&spread) - part.log_evidence(&spread) > FAR
         {
             let best = best.clone();
             self.learn_errors(&best);
@@ -246,23 +261,22 @@ impl Search<'_> {
         }
         let fits = if base.model.parts.is_empty() { self.settings.fits } else { 1 };
         quick.truncate(fits);
-        let lead = quick.first().map_or(0.0, |best| best.log_evidence(1.0));
+        let lead = quick.first().map_or(0.0, |best| best.log_evidence(&spread));
         let mut rivals: Vec<Rival> = quick
             .into_iter()
             .enumerate()
             .map(|(rank, quick)| {
                 // The ranking of those far behind needs no exact optimum.
-                let near = lead - quick.log_evidence(1.0) < NEAR;
+                let near = lead - quick.log_evidence(&spread) < NEAR;
                 let effort = if rank == 0 || near { Effort::Full } else { Effort::Quick };
                 let fit = fit(&self.study, quick.model, Begin::at(&quick.x), effort);
                 Rival { heldout: self.heldout(&fit), fit, gain: 0.0 }
             })
             .collect();
-        let best = rivals.iter().map(|rival| rival.fit.chi2()).fold(base.chi2(), f64::min);
-        let dispersion = (best / self.study.len() as f64).max(1.0);
-        let without = base.log_evidence(dispersion);
+        let dispersion = dispersion(rivals.iter().map(|rival| &rival.fit).chain([&base]));
+        let without = base.log_evidence(&dispersion);
         for rival in &mut rivals {
-            rival.gain = rival.fit.log_evidence(dispersion) - without;
+            rival.gain = rival.fit.log_evidence(&dispersion) - without;
         }
         rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         Round { promises, rivals, before: self.heldout(&base), dispersion }
@@ -282,15 +296,32 @@ impl Search<'_> {
                 fit(&part, model, begin, Effort::Quick)
             })
             .collect();
-        quick.sort_by(|a, b| b.log_evidence(1.0).total_cmp(&a.log_evidence(1.0)));
+        let spread = dispersion(quick.iter().chain([&base]));
+        quick.sort_by(|a, b| b.log_evidence(&spread).total_cmp(&a.log_evidence(&spread)));
         quick
     }
 }
 
-/// Whether what was held out is explained better too. Small gains may hide in its scatter, but not large ones.
-fn agrees(rival: &Rival, round: &Round) -> bool {
-    let gains: Vec<f64> = round.before.iter().zip(&rival.heldout).map(|(before, after)| before - after).collect();
-    gains.iter().sum::<f64>() > 0.0
+/// Whether the last effect is there whichever episodes are left out: some strength of it has the same sign in nearly all resamples.
+fn lasts(fit: &Fit, seed: u64) -> bool {
+    let Some(part) = fit.model.parts.last() else { return false };
+    let first = fit.x.len() - part.coordinates.len();
+    let samples = bootstrap(fit, seed);
+    part.strengths().any(|index| {
+        // A body in the way begins with a size: its absence is not at 0.
+        let absent = if part.begin.is_some() { part.coordinates[index].range[0] } else { 0.0 };
+        let above = samples.iter().filter(|x| x[first + index] > absent).count();
+        above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
+    })
+}
+
+/// Whether what was held out is explained better too. As above, what neither explains has no say.
+fn agrees(rival: &Rival, round: &Round, counts: &[usize]) -> bool {
+    let gains = round.before.iter().zip(&rival.heldout).zip(counts).map(|((before, after), count)| {
+        let dispersion = (before.min(*after) / (*count).max(1) as f64).max(1.0);
+        (before - after) / dispersion
+    });
+    gains.sum::<f64>() > 0.0
 }
 
 /// The linear step of the screening as far as it helps: large effects are not linear.
@@ -336,7 +367,7 @@ fn context(simulator: &Simulator, null: &Fit, log: &Log, nominal: &Nominal) -> C
             }
         }
     }
-    let obstacles_m = stops(simulator, null);
+    let obstacles_m = stops(simulator, null, theta.object.shape.footprint_radius_m(theta.object.size_m));
     Context {
         world,
         theta,
@@ -346,6 +377,7 @@ fn context(simulator: &Simulator, null: &Fit, log: &Log, nominal: &Nominal) -> C
         tool: nominal.has_tool(),
         forces: has(Kind::WristForce) || has(Kind::JointTorque),
         joints: has(Kind::JointPosition) || (nominal.joints() > 0 && has(Kind::ToolPosition)),
+        wrist_torques: has(Kind::WristTorque),
         joint_torques: has(Kind::JointTorque),
     }
 }
@@ -366,23 +398,17 @@ fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
     centres
 }
 
-/// Places where something may stand in the way: ahead of where the tool meets a force that the model does not know of, and ahead of where
-/// objects end that should have gone farther.
-fn stops(simulator: &Simulator, null: &Fit) -> Vec<[f64; 2]> {
+/// Places where something may stand in the way: ahead of where the tool meets a force that the model does not know of, and beside where objects
+/// of `radius_m` leave the simulated path.
+fn stops(simulator: &Simulator, null: &Fit, radius_m: f64) -> Vec<[f64; 2]> {
     let hypothesis = null.model.hypothesis(&null.x);
     let mut found: Vec<(f64, [f64; 2])> = Vec::new();
     for trial in simulator.trials {
         let (_, readings) = simulator.readings(&hypothesis, &Engine::default(), Nudge::default(), trial);
         found.extend(trial.blocked(&readings, AHEAD_M).filter(|(surprise_n, _)| *surprise_n > UNEXPECTED_N));
-        let (Some(last), Some(measured)) = (readings.last(), trial.last_position()) else { continue };
-        let simulated = last.object.position_m;
-        let miss = [simulated[0] - measured[0], simulated[1] - measured[1]];
-        let length = miss[0].hypot(miss[1]);
-        if length > 0.005 {
-            let ahead = |axis: usize| measured[axis] + AHEAD_M * miss[axis] / length;
-            // A newton a millimetre, so that both kinds of surprise can be compared.
-            found.push((1e3 * length, [ahead(0), ahead(1)]));
-        }
+        // A newton a millimetre, so that both kinds of surprise can be compared.
+        let deflected = trial.deflected(&readings, radius_m + OBSTACLE_M);
+        found.extend(deflected.filter(|(off_m, _)| *off_m > OFF_M).map(|(off_m, place)| (1e3 * off_m, place)));
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let points: Vec<[f64; 2]> = found.iter().take(12).map(|(_, point)| *point).collect();
@@ -392,3 +418,6 @@ fn stops(simulator: &Simulator, null: &Fit) -> Vec<[f64; 2]> {
 /// A force, N, that no friction explains, and how far ahead, m, of tool or object the centre of an obstacle is looked for.
 const UNEXPECTED_N: f64 = 3.0;
 const AHEAD_M: f64 = 0.05;
+/// How far off, m, an object has to end, and the radius, m, of the obstacles that a fit begins with.
+const OFF_M: f64 = 0.005;
+const OBSTACLE_M: f64 = 0.03;

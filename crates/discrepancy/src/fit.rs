@@ -45,19 +45,35 @@ impl Fit {
         chi2(&self.residuals)
     }
 
-    /// Laplace's ln evidence with residuals whose variance is `dispersion`.
+    /// Laplace's ln evidence with residuals whose variance is `dispersion`, one for each episode: an episode in which a contact went another way
+    /// than in any model has no say about what the others show.
     #[must_use]
-    pub fn log_evidence(&self, dispersion: f64) -> f64 {
+    pub fn log_evidence(&self, dispersion: &[f64]) -> f64 {
         let prior = 0.5 * self.x.iter().map(|x| x * x).sum::<f64>();
         let n = self.x.len();
-        let hessian = DMatrix::from_fn(n, n, |i, j| {
-            dot(&self.jacobian[i], &self.jacobian[j]) / dispersion + f64::from(u8::from(i == j))
-        });
+        let weighted = |a: &Stack, b: &Stack| -> f64 {
+            a.iter().zip(b).zip(dispersion).map(|((a, b), dispersion)| a.dot(b) / dispersion).sum()
+        };
+        let hessian =
+            DMatrix::from_fn(n, n, |i, j| weighted(&self.jacobian[i], &self.jacobian[j]) + f64::from(u8::from(i == j)));
         let determinant =
             hessian.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
         let sides = self.model.one_sided() as f64 * std::f64::consts::LN_2;
-        -0.5 * self.chi2() / dispersion - prior - 0.5 * determinant + sides
+        -0.5 * weighted(&self.residuals, &self.residuals) - prior - 0.5 * determinant + sides
     }
+}
+
+/// Variance of the residuals of each episode under the model of `fits` that explains it best; at least 1.
+#[must_use]
+pub fn dispersion<'a>(fits: impl IntoIterator<Item = &'a Fit>) -> Vec<f64> {
+    let fits: Vec<&Fit> = fits.into_iter().collect();
+    let episodes = fits.first().map_or(0, |fit| fit.residuals.len());
+    (0..episodes)
+        .map(|t| {
+            let mean_square = |fit: &Fit| fit.residuals[t].norm_squared() / fit.residuals[t].len().max(1) as f64;
+            fits.iter().copied().map(mean_square).fold(f64::INFINITY, f64::min).max(1.0)
+        })
+        .collect()
 }
 
 fn pick(stack: &Stack, places: &[usize]) -> Stack {

@@ -53,3 +53,47 @@ pub fn middle_90(mut values: Vec<f64>) -> [f64; 2] {
     let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
     [at(0.05), at(0.95)]
 }
+
+#[cfg(test)]
+mod tests {
+    use pomdp::{Purpose, Seed};
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::model::Model;
+
+    /// r = noise − s x for one tunable: what an exact fit of a linear model leaves.
+    fn linear(episodes: usize, seed: u64) -> (Fit, f64) {
+        let mut rng = Seed(seed).stream(Purpose::Test, 0);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let slopes: Vec<DVector<f64>> = (0..episodes).map(|_| DVector::from_fn(20, |_, _| normal())).collect();
+        let noise: Vec<DVector<f64>> = (0..episodes).map(|_| DVector::from_fn(20, |_, _| normal())).collect();
+        let information = 1.0 + slopes.iter().map(DVector::norm_squared).sum::<f64>();
+        let x = -slopes.iter().zip(&noise).map(|(s, n)| s.dot(n)).sum::<f64>() / information;
+        let residuals = slopes.iter().zip(&noise).map(|(s, n)| n + s * x).collect();
+        let fit = Fit { model: Model::nominal(1), x: vec![x], raw: Vec::new(), residuals, jacobian: vec![slopes] };
+        (fit, information.recip().sqrt())
+    }
+
+    #[test]
+    fn intervals_are_as_wide_as_the_exact_ones_and_cover_the_truth() {
+        let (mut covered, mut width) = (0, 0.0);
+        for seed in 0..200 {
+            let (fit, stddev) = linear(27, seed);
+            let [low, high] = middle_90(bootstrap(&fit, seed).into_iter().map(|x| x[0]).collect());
+            covered += u32::from(low < 0.0 && 0.0 < high);
+            width += (high - low) / (2.0 * 1.645 * stddev) / 200.0;
+        }
+        // Binomial with 200 and 0.9: standard deviation 4.2. 27 episodes make the bootstrap a little narrow.
+        assert!((165..=195).contains(&covered), "{covered}");
+        assert!((0.9..1.05).contains(&width), "{width}");
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_resamples() {
+        let (fit, _) = linear(5, 1);
+        assert_eq!(bootstrap(&fit, 3), bootstrap(&fit, 3));
+        assert_ne!(bootstrap(&fit, 3), bootstrap(&fit, 4));
+        assert_eq!(middle_90((0..101).map(f64::from).collect()), [5.0, 95.0]);
+    }
+}

@@ -138,7 +138,9 @@ impl Report {
         let (before, after) = (mean(&diagnosis.heldout[0]), mean(&diagnosis.heldout[1]));
         let gap = before - NOISE_FLOOR;
         let closed_fraction = if gap > 0.0 { ((before - after) / gap).min(1.0) } else { 1.0 };
-        let unexplained = after > settings.unexplained && closed_fraction < CLOSED;
+        let [limit, share] = settings.unexplained;
+        let failing = diagnosis.mean_squares.iter().filter(|mean_square| **mean_square > limit).count();
+        let unexplained = failing as f64 > share * diagnosis.mean_squares.len() as f64 && closed_fraction < CLOSED;
         let effects = effects(diagnosis, settings);
         let verdict = match (unexplained, effects.is_empty()) {
             (true, _) => Verdict::Unknown,

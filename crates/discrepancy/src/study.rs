@@ -30,7 +30,7 @@ fn variants(engine: &Engine) -> [Engine; 5] {
         Engine { refinement: 2 * engine.refinement, ..*engine },
         Engine { refinement: 3 * engine.refinement, solver_iterations: 2, ..*engine },
         Engine { solver_iterations: 2 * engine.solver_iterations, ..*engine },
-        Engine { contact_frequency_hz: 1.5 * engine.contact_frequency_hz, ..*engine },
+        Engine { contact_frequency_hz: 3.0 * engine.contact_frequency_hz, ..*engine },
         Engine { on_points: !engine.on_points, ..*engine },
     ]
 }

@@ -410,14 +410,28 @@ pub(crate) fn orientations(episode: &Episode) -> Vec<Option<[f64; 4]>> {
 }
 
 impl Trial {
-    /// Where the object was last read, m.
+    /// Where something may have pushed the object out of its way: how far it is off in the end, m, and the place, m, `reach_m` from its centre
+    /// against the direction in which it first left the simulated path.
     #[must_use]
-    pub fn last_position(&self) -> Option<[f64; 3]> {
-        let last = |component: usize| {
+    pub fn deflected(&self, readings: &[RigReading], reach_m: f64) -> Option<(f64, [f64; 2])> {
+        let place = |component: usize, row: usize| {
             let scalar = self.scalars.iter().find(|s| s.kind == Kind::ObjectPosition && s.component == component)?;
-            scalar.values.iter().rev().flatten().next().copied()
+            Some((scalar.values[row]?, scalar.sigma))
         };
-        Some([last(0)?, last(1)?, last(2)?])
+        let offs = || {
+            self.rows.iter().enumerate().skip(1).filter_map(|(row, (tick, _))| {
+                let simulated = readings.get(tick.checked_sub(1)?)?.object.position_m;
+                let ((x, sigma), (y, _)) = (place(0, row)?, place(1, row)?);
+                Some(([x, y], [x - simulated[0], y - simulated[1]], sigma))
+            })
+        };
+        let (_, [dx, dy], _) = offs().next_back()?;
+        // Clear of noise, and of what friction alone does.
+        let left = offs().find(|(_, [dx, dy], sigma)| dx.hypot(*dy) > 5.0 * sigma + 0.002);
+        left.map(|([x, y], [ax, ay], _)| {
+            let size = ax.hypot(ay);
+            (dx.hypot(dy), [x - reach_m * ax / size, y - reach_m * ay / size])
+        })
     }
 
     /// The largest force on the tool that the simulation does not know of, N, and the place, m, `ahead_m` ahead of the tool against it.

@@ -1,0 +1,94 @@
+//! Logs recorded from MuJoCo (tests/data/mujoco-logs): what they hide is named, and nothing else.
+
+use std::path::{Path, PathBuf};
+
+use discrepancy::{ModelFile, Nominal, Report, Settings, Verdict, diagnose, rig_tool};
+
+fn logs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs")
+}
+
+/// The report on a set, begun with a model if there is one, and the model that it ends with.
+fn report(set: &str, model: Option<&ModelFile>) -> (Report, ModelFile) {
+    let log = measured_log::read(&logs().join(set)).unwrap();
+    let mut nominal = Nominal::new(&log.header, rig_tool(&log, None).unwrap()).unwrap();
+    if let Some(model) = model {
+        model.apply(&mut nominal).unwrap();
+    }
+    let settings = Settings::default();
+    let diagnosis = diagnose(&log, set, &nominal, &settings).unwrap();
+    let report = Report::new(&diagnosis, &settings, 0.0);
+    let model = ModelFile::new(&nominal, &diagnosis, &report);
+    (report, model)
+}
+
+#[test]
+fn a_tilted_table_is_named_with_its_slope_and_a_second_pass_finds_nothing() {
+    let (found, model) = report("set-003", None);
+    assert_eq!(found.verdict, Verdict::Effect, "{}", found.summary);
+    let [effect] = found.effects.as_slice() else { panic!("{:?}", found.effects) };
+    assert_eq!(effect.name, "table_tilt");
+    assert!(effect.confidence > 0.9);
+    // What MuJoCo was given: tests/data/mujoco-logs/truth/set-003.json.
+    for (value, truth) in effect.parameters.iter().zip([-0.021_389, -0.007_801]) {
+        assert!((value.value - truth).abs() < 0.001, "{value:?}");
+        assert!(value.interval90[0] < value.value && value.value < value.interval90[1], "{value:?}");
+    }
+    assert!(found.heldout.before > 1.4 && found.heldout.after < 1.1, "{:?}", found.heldout);
+    assert!(found.rollouts <= 5000, "{}", found.rollouts);
+
+    let text = model.to_toml().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.toml");
+    std::fs::write(&path, text).unwrap();
+    let (again, _) = report("set-003", Some(&ModelFile::read(&path).unwrap()));
+    assert_eq!(again.verdict, Verdict::None, "{}", again.summary);
+    assert_eq!(again.heldout.before, again.heldout.after);
+}
+
+#[test]
+fn where_nothing_is_hidden_nothing_is_named() {
+    let (found, model) = report("set-002", None);
+    assert_eq!(found.verdict, Verdict::None, "{}", found.summary);
+    assert!(found.effects.is_empty() && found.confusion_set.is_empty());
+    assert!(!model.to_toml().unwrap().contains("table_tilt"));
+}
+
+#[test]
+fn what_the_catalogue_does_not_have_is_called_unknown() {
+    // A magnet under the table.
+    let (found, _) = report("set-010", None);
+    assert_eq!(found.verdict, Verdict::Unknown, "{}", found.summary);
+    assert!(found.description.is_some());
+}
+
+#[test]
+fn the_answer_does_not_depend_on_the_number_of_threads() {
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        serde_json::to_string(&pool.install(|| report("set-009", None).0)).unwrap()
+    };
+    let one = with(1);
+    assert!(one.contains("wrist_payload"), "{one}");
+    assert_eq!(one, with(2));
+}
+
+#[test]
+fn a_broken_model_file_is_refused_with_file_and_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("model.toml");
+    for (text, expected) in [
+        ("version = 2", "key `version`: expected 1, found 2"),
+        ("version = 1\nnominl = {}", "nominl"),
+        ("version = 1\n[effects]\nmodel = [{ table_tilt = { slope_x_rad = 9.0, slope_y_rad = 0.0 } }]", "slope_x_rad"),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let error = ModelFile::read(&path).unwrap_err().to_string();
+        assert!(error.contains(expected) && error.contains("model.toml"), "{error}");
+    }
+    std::fs::write(&path, "version = 1\n[nominal]\n\"object.colour\" = 1.0\n").unwrap();
+    let log = measured_log::read(&logs().join("set-002")).unwrap();
+    let mut nominal = Nominal::new(&log.header, rig_tool(&log, None).unwrap()).unwrap();
+    let error = ModelFile::read(&path).unwrap().apply(&mut nominal).unwrap_err().to_string();
+    assert!(error.contains("object.colour") && error.contains("object.mass_kg"), "{error}");
+}
