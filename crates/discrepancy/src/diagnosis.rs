@@ -6,6 +6,7 @@ use physics_model::EffectKind;
 
 use crate::candidate::{Context, candidates};
 use crate::error::Error;
+use crate::evidence::Evidence;
 use crate::fit::{Begin, Effort, Fit, dispersion, fit};
 use crate::interval::bootstrap;
 use crate::locate::{Cell, locate};
@@ -113,6 +114,8 @@ pub struct Diagnosis {
     pub located: Vec<Cell>,
     /// Where the accepted model still does.
     pub remaining: Vec<Cell>,
+    /// Held-out episodes before and after, for plots.
+    pub evidence: Evidence,
     /// Simulated episodes.
     pub rollouts: usize,
 }
@@ -203,6 +206,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     Ok(Diagnosis {
         located,
         remaining,
+        evidence: Evidence::new(&search.kept, &null, &accepted),
         nominal: null,
         model: accepted,
         rounds,

@@ -18,6 +18,7 @@
 pub mod candidate;
 pub mod diagnosis;
 mod error;
+pub mod evidence;
 pub mod fit;
 pub mod interval;
 pub mod locate;

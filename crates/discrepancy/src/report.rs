@@ -4,6 +4,7 @@ use physics_model::EffectKind;
 use serde::Serialize;
 
 use crate::diagnosis::{Diagnosis, Settings};
+use crate::evidence::Evidence;
 use crate::interval::{bootstrap, middle_90};
 use crate::locate::Cell;
 use crate::separate;
@@ -116,6 +117,8 @@ pub struct Report {
     pub heldout: Heldout,
     /// The nominal model, re-tuned.
     pub retuned: Vec<Retuned>,
+    /// Held-out episodes before and after, for plots.
+    pub evidence: Evidence,
     /// What to record next to tell the confusion set apart.
     pub next_experiment: String,
     /// Simulated episodes.
@@ -170,6 +173,7 @@ impl Report {
             },
             retuned: retuned(diagnosis, settings),
             effects,
+            evidence: diagnosis.evidence.clone(),
             rollouts: diagnosis.rollouts,
             seconds,
         }

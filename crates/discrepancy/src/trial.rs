@@ -14,6 +14,10 @@ use serde::Serialize;
 
 use crate::noise::NoiseLevels;
 
+mod series;
+
+pub use series::Compared;
+
 /// Blocks of a channel in an episode, about.
 const BLOCKS: usize = 80;
 /// Most rows at rest that the start is averaged over.

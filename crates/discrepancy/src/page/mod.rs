@@ -1,0 +1,100 @@
+//! `report.html`: the report for a reader. One file, no scripts, nothing from elsewhere.
+
+mod effects;
+mod gap;
+mod heat_map;
+mod html;
+mod svg;
+#[cfg(test)]
+mod tests;
+
+use crate::report::{Report, Verdict};
+use html::{escape, fixed};
+
+/// A page about a report on the log `name`.
+#[must_use]
+pub fn page(name: &str, report: &Report) -> String {
+    let title = escape(name);
+    let mut out = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\
+         <title>Diagnosis of {title}</title>\n<style>\n{}</style></head>\n<body><main>",
+        include_str!("style.css")
+    );
+    out += &verdict(&title, report);
+    let mut section = |id: &str, heading: &str, body: &str| {
+        out += &format!("\n<section id=\"{id}\"><h2>{heading}</h2>{body}</section>");
+    };
+    section("what", "What", &effects::what(report));
+    let before =
+        "<p>Where the re-tuned nominal model disagrees with the log, on the episodes that it was fitted to.</p>";
+    section("where", "Where", &(before.to_string() + &heat_map::maps(&report.located)));
+    section("gap", "Before and after", &gap::before_after(report));
+    section("rivals", "Rivals", &effects::ranking(report));
+    section("nominal", "Nominal values, re-tuned", &effects::nominal(&report.retuned));
+    let map = match report.verdict {
+        Verdict::None => String::new(),
+        _ if report.remaining.is_empty() => "<p class=\"soft\">Nothing was compared.</p>".into(),
+        _ => heat_map::by_phase(&report.remaining),
+    };
+    section("remains", "What remains", &(gap::remains(report) + &map));
+    section("reading", "How to read the figures", &foot(report));
+    out + "</main></body></html>\n"
+}
+
+fn verdict(title: &str, report: &Report) -> String {
+    let (class, badge) = match report.verdict {
+        Verdict::Effect => ("effect", "effect found"),
+        Verdict::None => ("none", "nothing missing"),
+        Verdict::Unknown => ("unknown", "unknown effect"),
+    };
+    let heldout = &report.heldout;
+    let mut facts = vec![if report.effects.is_empty() {
+        (fixed(heldout.before, 2), "held-out error; 1 is noise")
+    } else {
+        (format!("{} → {}", fixed(heldout.before, 2), fixed(heldout.after, 2)), "held-out error; 1 is noise")
+    }];
+    if let Some(first) = report.effects.first() {
+        facts.push((format!("{} %", fixed(100.0 * heldout.closed_fraction, 0)), "of the gap closed"));
+        facts.push((effects::confidence(first.confidence), "confidence in the name"));
+    }
+    facts.push((report.heldout.episodes.len().to_string(), "episodes held out"));
+    let facts: String =
+        facts.iter().map(|(number, what)| format!("<li><b>{number}</b><span>{what}</span></li>")).collect();
+    let call = match &report.description {
+        Some(description) => format!("<p class=\"call\">What is left: {}.</p>", escape(description)),
+        None => String::new(),
+    };
+    format!(
+        "<header><p class=\"log\">{title}</p><span class=\"badge {class}\">{badge}</span><h1>{}</h1>{call}<ul class=\"facts\">{facts}</ul></header>",
+        escape(&report.summary)
+    )
+}
+
+fn foot(report: &Report) -> String {
+    let lines = [
+        (
+            "residual",
+            "(measured − simulated) / noise, over a block of rows; white: freed of what the solver's settings and the start's error would do.",
+        ),
+        ("mean square", "Of white residuals; 1 is noise alone, 4 is an error twice as large as the noise."),
+        (
+            "held-out",
+            "Episodes that nothing was fitted to; before: nominal model re-tuned; after: with the named effects.",
+        ),
+        (
+            "ln evidence",
+            "How much more probable the log is under a model, its free values integrated over; + 3 is 20 to 1.",
+        ),
+        ("confidence", "Probability of the name among the fitted rivals and the nominal model."),
+        ("90 % interval", "By bootstrap over episodes: what other episodes of the same kind would have given."),
+        ("p value", "Chance that some cell stands out as much by luck, by flips of signs between episodes."),
+        ("share", "Part of all that is beyond noise."),
+    ];
+    let lines: String = lines.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{text}</dd>")).collect();
+    format!(
+        "<dl>{lines}</dl><p class=\"soft\">{} simulated episodes, {} s. Version {} of the contract of report.json.</p>",
+        report.rollouts,
+        fixed(report.seconds, 1),
+        report.version
+    )
+}
