@@ -3,7 +3,7 @@
 use physics_model::EffectKind;
 use physics_model::effect::Neutral;
 
-use super::html::{decimals, escape, fixed, significant, words};
+use super::html::{decimals, escape, fixed, log_evidence, significant, words};
 use super::svg::{Axis, strip, strip_labels};
 use crate::report::{NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
 
@@ -28,7 +28,7 @@ fn effect(effect: &NamedEffect) -> String {
         escape(effect.name),
         escape(effect.description),
         confidence(effect.confidence),
-        fixed(effect.log_evidence, 0),
+        log_evidence(effect.log_evidence),
     );
     for value in &effect.parameters {
         out += &parameter(effect, value);
@@ -105,7 +105,7 @@ pub(super) fn ranking(report: &Report) -> String {
             "<div class=\"row rank axis\"><span></span><div>{}</div><span></span></div>",
             strip_labels(&axis, 4)
         );
-        out += "<p class=\"soft\">Gain in ln evidence over the re-tuned nominal model; behind: how much less than the best (3 is 20 to 1); held-out: mean square with it.</p>";
+        out += "<p class=\"soft\">Gain in ln evidence over the re-tuned nominal model; behind: how much less than the best (3 is 20 to 1); held-out: mean square with it. A name needs both: the gain, and held-out episodes that agree.</p>";
     }
     if report.confusion_set.len() > 1 {
         let names: Vec<String> = report.confusion_set.iter().map(|name| words(name)).collect();
@@ -126,14 +126,13 @@ fn bar(axis: &Axis, rival: &RankedEffect, best: f64) -> String {
         100.0 * a,
         100.0 * (b - a).max(0.004),
     );
-    let digits = if gain.abs() < 9.95 { 1 } else { 0 };
     let behind = best - rival.log_evidence;
-    let behind = if behind > 0.0 { fixed(-behind, usize::from(behind < 9.95)) } else { "–".into() };
+    let behind = if behind > 0.0 { log_evidence(-behind) } else { "–".into() };
     format!(
         "<div class=\"row rank\"><span>{}</span><div>{}</div><span><span>{}</span><span>{behind}</span><span>{}</span></span></div>",
         words(rival.name),
         strip(axis, 4, 24, &inside),
-        fixed(rival.log_evidence, digits),
+        log_evidence(rival.log_evidence),
         fixed(rival.heldout, 2),
     )
 }
@@ -148,7 +147,10 @@ pub(super) fn nominal(retuned: &[Retuned]) -> String {
     }
     let axis = Axis::linear([-Z_REACH, Z_REACH]);
     let mut out: String = retuned.iter().map(|value| z_row(&axis, value)).collect();
-    out += &format!("<div class=\"row axis\"><span></span><div>{}</div><span></span></div>", strip_labels(&axis, 8));
+    out += &format!(
+        "<div class=\"row nominal axis\"><span></span><div>{}</div><span></span></div>",
+        strip_labels(&axis, 8)
+    );
     out + "<p class=\"soft\">z: distance from the prior's mean in its standard deviations, with the 90 % interval; beyond 2 the nominal value was off, \
            which is no missing effect.</p>"
 }
@@ -169,7 +171,7 @@ fn z_row(axis: &Axis, value: &Retuned) -> String {
     );
     let class = if score.abs() > 2.0 { " class=\"alarm\"" } else { "" };
     format!(
-        "<div class=\"row\"><span>{}<br/><span class=\"soft\">prior {} ± {}</span></span><div>{}</div><span><b>{}</b><br/><span{class}>z {}</span></span></div>",
+        "<div class=\"row nominal\"><span>{}<br/><span class=\"soft\">prior {} ± {}</span></span><div>{}</div><span><b>{}</b><br/><span{class}>z {}</span></span></div>",
         escape(&value.key),
         significant(mean, 3),
         significant(stddev, 2),

@@ -1,6 +1,6 @@
 //! Before and after: held-out episodes, the worst one in plots, and what the residuals look like.
 
-use super::html::{escape, fixed, words};
+use super::html::{escape, fixed, mean_square, words};
 use super::svg::{Axis, Plot, strip, strip_labels};
 use crate::evidence::{Course, Evidence, Path, REACH, Residuals};
 use crate::report::{Report, Verdict};
@@ -55,9 +55,10 @@ fn dumbbells(report: &Report, same: bool) -> String {
         if !same {
             inside += &format!("<circle class=\"a\" cx=\"{a}\" cy=\"11\" r=\"5\"/>");
         }
-        let numbers = if same { fixed(*before, 2) } else { format!("{} → {}", fixed(*before, 2), fixed(*after, 2)) };
+        let number = |value: f64| if value.abs() < 9.995 { fixed(value, 2) } else { mean_square(value) };
+        let numbers = if same { number(*before) } else { format!("{} → {}", number(*before), number(*after)) };
         out += &format!(
-            "<div class=\"row\"><span>episode {id}</span><div>{}</div><span>{numbers}</span></div>",
+            "<div class=\"row episode\"><span>episode {id}</span><div>{}</div><span>{numbers}</span></div>",
             strip(&axis, 5, 22, &inside)
         );
     }

@@ -60,12 +60,12 @@ pub(super) fn by_phase(cells: &[Cell]) -> String {
 /// What the colours and the star mean.
 fn key(cells: &[Cell]) -> String {
     let mut out = String::from("<table class=\"heat\"><tbody><tr><th>colour</th>");
-    for (class, label) in ["1", "1.8", "3.2", "5.6", "10", "18", "32", "56", "100+"].into_iter().enumerate() {
+    for (class, label) in ["1", "1.8", "3.2", "5.6", "10", "18", "32", "56", "100"].into_iter().enumerate() {
         out += &format!("<td class=\"h{class}\">{label}</td>");
     }
     let marked = cells.iter().any(|cell| cell.p_value <= SIGNIFICANT);
     let marked = if marked { "" } else { " No cell here does." };
-    out + "</tr></tbody></table><p class=\"soft\">Mean square of the residuals: 1 is noise. * stands out in most episodes: p ≤ 0.05, corrected for the \
+    out + "</tr></tbody></table><p class=\"soft\">Mean square of the residuals: 1 is noise; the darkest or brightest, 100 and more. * stands out in most episodes: p ≤ 0.05, corrected for the \
            number of cells."
         + marked
         + "</p>"

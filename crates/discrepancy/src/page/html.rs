@@ -57,6 +57,14 @@ pub(super) fn mean_square(value: f64) -> String {
     }
 }
 
+/// A ln evidence: a decimal where it is small.
+pub(super) fn log_evidence(value: f64) -> String {
+    match value.abs() {
+        size if size >= 9_999.5 && size.is_finite() => format!("{}k", fixed(value / 1e3, 1)),
+        size => fixed(value, usize::from(size < 9.95)),
+    }
+}
+
 /// Decimals at which an interval still shows two digits of its half-width.
 pub(super) fn decimals(interval: [f64; 2], value: f64) -> usize {
     let half = 0.5 * (interval[1] - interval[0]).abs();

@@ -64,8 +64,11 @@ impl Axis {
         if self.logarithmic {
             return significant(tick, 1);
         }
+        if tick.abs() >= 9_999.5 {
+            return format!("{}k", significant(tick / 1e3, 2));
+        }
         let step = (self.high - self.low) / 10.0;
-        fixed(tick, (-step.log10().floor()).clamp(0.0, 6.0) as usize).to_string()
+        fixed(tick, (-step.log10().floor()).clamp(0.0, 6.0) as usize)
     }
 }
 
@@ -107,7 +110,7 @@ pub(super) struct Plot {
 
 /// Size of a plot, and its inner borders: left, right, top, bottom.
 const SIZE: [f64; 2] = [400.0, 280.0];
-const BORDERS: [f64; 4] = [52.0, 388.0, 10.0, 240.0];
+const BORDERS: [f64; 4] = [64.0, 388.0, 10.0, 240.0];
 
 impl Plot {
     /// Empty.
