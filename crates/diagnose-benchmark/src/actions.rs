@@ -18,6 +18,83 @@ pub struct Script {
     pub commands: Vec<[f64; 3]>,
 }
 
+impl Script {
+    /// The same elsewhere.
+    pub fn shift(&mut self, by_m: [f64; 2]) {
+        for (axis, by) in by_m.into_iter().enumerate() {
+            self.place_m[axis] += by;
+            self.commands.iter_mut().for_each(|command| command[axis] += by);
+        }
+    }
+
+    /// Shifted as little as brings all commands between two corners, which must be farther apart than they are.
+    pub fn fit_into(&mut self, low_m: [f64; 2], high_m: [f64; 2]) {
+        let by = std::array::from_fn(|axis| {
+            let places = || self.commands.iter().map(|command| command[axis]);
+            let (least, most) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
+            (low_m[axis] - least).max(0.0) + (high_m[axis] - most).min(0.0)
+        });
+        self.shift(by);
+    }
+
+    /// Distance, m, of a point from the object at the start, and from the way of the tool.
+    fn clearance_m(&self, point_m: [f64; 2]) -> (f64, f64) {
+        let from = |x: f64, y: f64| (x - point_m[0]).hypot(y - point_m[1]);
+        let tool = self.commands.iter().map(|c| from(c[0], c[1])).fold(f64::INFINITY, f64::min);
+        (from(self.place_m[0], self.place_m[1]), tool)
+    }
+
+    /// Where the object's centre is pushed to, roughly, m: as far beyond its place as the tool goes beyond where it touches.
+    fn pushed_to_m(&self, touch_m: f64) -> [f64; 2] {
+        let first = self.commands[0];
+        let along = [self.place_m[0] - first[0], self.place_m[1] - first[1]];
+        let length = along[0].hypot(along[1]).max(1e-9);
+        let ahead = |c: &[f64; 3]| ((c[0] - first[0]) * along[0] + (c[1] - first[1]) * along[1]) / length;
+        let farthest = self.commands.iter().map(ahead).fold(0.0, f64::max);
+        let share = (farthest + touch_m - length).max(0.0) / length;
+        [self.place_m[0] + share * along[0], self.place_m[1] + share * along[1]]
+    }
+}
+
+/// A place for an obstacle of this radius that pushed objects meet, and tools do not: of 40 drawn ones that which most do.
+#[must_use]
+pub fn place_obstacle(scripts: &[Script], scene: &Scene, radius_m: f64, tool_radius_m: f64, rng: &mut Rng) -> [f64; 2] {
+    let reach_m = scene.touch_m - tool_radius_m;
+    let mut best = ([scene.centre_m[0] + 0.12, scene.centre_m[1]], 0);
+    for _ in 0..40 {
+        let place: [f64; 2] = std::array::from_fn(|axis| scene.centre_m[axis] + rng.random_range(-0.16..0.16));
+        let meets = |script: &&Script| {
+            let (object, tool) = script.clearance_m(place);
+            let to = script.pushed_to_m(scene.touch_m);
+            let end = (to[0] - place[0]).hypot(to[1] - place[1]);
+            object > reach_m + radius_m && tool > tool_radius_m + radius_m && end < reach_m + radius_m - 0.015
+        };
+        let count = scripts.iter().filter(meets).count();
+        if count > best.1 {
+            best = (place, count);
+        }
+    }
+    best.0
+}
+
+/// Moves what would begin in an obstacle, or send the tool into it: nobody puts an object where something stands.
+pub fn avoid(scripts: &mut [Script], scene: &Scene, (place_m, radius_m): ([f64; 2], f64), rng: &mut Rng) {
+    // Touch is reach and the tool's radius, at least as much as either needs.
+    let (object_m, tool_m) = (scene.touch_m + radius_m - 0.01, 0.03 + radius_m);
+    for script in scripts {
+        for _ in 0..50 {
+            let (object, tool) = script.clearance_m(place_m);
+            if object > object_m && tool > tool_m {
+                break;
+            }
+            let by = std::array::from_fn(|axis| {
+                scene.centre_m[axis] + rng.random_range(-0.2..0.2) - script.place_m[axis]
+            });
+            script.shift(by);
+        }
+    }
+}
+
 /// What a script needs to know of the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {

@@ -1,6 +1,7 @@
 //! Logs of a rig with a known world.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use measured_log::{
     Axis, Channel, Component, Episode, Header, Log, Noise, Number, Object, Readings, Robot, Shape, SplitConfig, Table,
@@ -8,16 +9,17 @@ use measured_log::{
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::effect::Effect;
-use physics_model::rig::{Rig, RigObject, RigShape, RigStart, RigTool};
+use physics_model::rig::{Rig, RigError, RigObject, RigReading, RigShape, RigStart, RigTool};
 use physics_model::{BodyState, EffectConfig, ObjectShape};
 use pomdp::{Purpose, Seed};
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::actions::{Scene, Script, designed, passive};
+use crate::actions::{Scene, Script, avoid, designed, passive};
+use crate::unknown::Unknown;
 
 /// What is done while the log is recorded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum Actions {
     /// Chosen to tell effects apart.
@@ -26,17 +28,34 @@ pub enum Actions {
     Passive,
 }
 
+impl Actions {
+    /// In tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Designed => "designed",
+            Self::Passive => "passive",
+        }
+    }
+}
+
 /// A set to generate.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SetSpec {
-    /// Seed of everything that is drawn.
+    /// Seed of what is done and of the noise.
     pub seed: u64,
+    /// The arm, or none.
+    pub robot: RobotName,
     /// Shape of the object.
     pub shape: ObjectShape,
     /// What the true world has and the nominal model lacks.
     pub effects: Vec<EffectConfig>,
+    /// The same, of no catalogue.
+    pub unknown: Option<Unknown>,
     /// True value over nominal: of mass and friction.
     pub nominal_errors: [f64; 2],
+    /// Whether the log gives the friction as fixed. Then it is exact, unless the effect is another friction.
+    pub fixed_friction: bool,
     /// Factor on the sensors' noise.
     pub noise: f64,
     /// What is done.
@@ -45,38 +64,181 @@ pub struct SetSpec {
     pub engine: (u32, u32, f64),
 }
 
-const PERIOD_SECS: f64 = 0.01;
-const TOOL_RADIUS_M: f64 = 0.02;
-const TOOL_FRICTION: f64 = 0.1;
-const MASS_KG: f64 = 0.5;
-const FRICTION: f64 = 0.35;
+/// The arm of a log, as a truth file says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RobotName {
+    /// A ball without an arm.
+    None,
+    /// Rethink Sawyer with its ball.
+    Sawyer,
+}
 
-/// The log of a set.
+/// Engines of true worlds. The model's is one step a tick, 4 iterations, 60 Hz.
+pub const ENGINES: [(u32, u32, f64); 6] =
+    [(3, 6, 80.0), (2, 4, 60.0), (4, 2, 60.0), (2, 8, 100.0), (5, 4, 70.0), (3, 3, 45.0)];
+
+pub(crate) const MASS_KG: f64 = 0.5;
+pub(crate) const FRICTION: f64 = 0.35;
+const PERIOD_SECS: f64 = 0.01;
+const TOOL_FRICTION: f64 = 0.1;
+/// Standard deviation of what a log says of mass and friction, as a share.
+const SHARE: f64 = 0.15;
+/// Force, N, at which an arm stops by itself: the rest of the episode is not recorded.
+const STOP_N: f64 = 40.0;
+/// Rows that an episode keeps at least.
+const LEAST_ROWS: usize = 30;
+
+impl SetSpec {
+    /// Sizes of the object, m, as in `ObjectTheta`.
+    #[must_use]
+    pub fn size_m(&self) -> [f64; 3] {
+        match self.shape {
+            ObjectShape::Box => [0.08, 0.06, 0.05],
+            ObjectShape::Cylinder => [0.035, 0.05, 0.0],
+            ObjectShape::Sphere => [0.03, 0.0, 0.0],
+        }
+    }
+
+    /// Radius of the tool as the log says it, m, and height of the table, m.
+    fn geometry(&self) -> (f64, f64) {
+        match self.robot {
+            RobotName::None => (0.02, 0.0),
+            // scenarios/robots/sawyer.toml, assets/robots/sawyer.urdf.
+            RobotName::Sawyer => (0.025, -0.1),
+        }
+    }
+
+    /// Where and how things are done.
+    #[must_use]
+    pub fn scene(&self) -> Scene {
+        let size_m = self.size_m();
+        let reach_m = self.shape.footprint_radius_m(size_m);
+        let (tool_m, table_m) = self.geometry();
+        Scene {
+            period_secs: PERIOD_SECS,
+            tool_height_m: table_m + self.shape.half_height_m(size_m).max(tool_m + 0.005).min(0.03),
+            touch_m: reach_m + tool_m,
+            half_width_m: if self.shape == ObjectShape::Box { 0.03 } else { 0.7 * reach_m },
+            centre_m: match self.robot {
+                RobotName::None => [0.0, 0.0],
+                RobotName::Sawyer => [0.53, 0.0],
+            },
+        }
+    }
+
+    /// What is done, if nothing stands in the way.
+    #[must_use]
+    pub fn scripts(&self) -> Vec<Script> {
+        let mut rng = Seed(self.seed).stream(Purpose::World, 0);
+        let scene = self.scene();
+        let mut scripts = match self.actions {
+            Actions::Designed => designed(&scene, &mut rng),
+            Actions::Passive => passive(&scene, &mut rng),
+        };
+        if self.robot == RobotName::Sawyer {
+            // The rectangle over which the inverse kinematics holds.
+            scripts.iter_mut().for_each(|script| script.fit_into([0.34, -0.45], [0.72, 0.45]));
+        }
+        if let Some(obstacle) = self.obstacle() {
+            avoid(&mut scripts, &scene, obstacle, &mut rng);
+        }
+        scripts
+    }
+
+    /// Place and radius of a hidden obstacle, m.
+    fn obstacle(&self) -> Option<([f64; 2], f64)> {
+        self.effects.iter().find_map(|effect| match effect {
+            EffectConfig::HiddenObstacle(body) => Some(([body.x_m, body.y_m], body.size_m[0])),
+            _ => None,
+        })
+    }
+
+    /// What the log says of itself: the nominal model.
+    #[must_use]
+    pub fn header(&self) -> Header {
+        let (fixed, size_m) = (Number::Fixed, self.size_m());
+        let (tool_m, table_m) = self.geometry();
+        let uncertain = |mean: f64| Number::Uncertain { mean, stddev: SHARE * mean };
+        let arm = self.robot != RobotName::None;
+        Header {
+            robot: if arm { Robot::Sawyer } else { Robot::None },
+            period_secs: PERIOD_SECS,
+            tool_radius_m: Some(tool_m),
+            tool_friction: Some(fixed(TOOL_FRICTION)),
+            gravity_mps2: 9.81,
+            table: Table {
+                height_m: fixed(table_m),
+                friction: if self.fixed_friction { fixed(FRICTION) } else { uncertain(FRICTION) },
+            },
+            object: Object {
+                shape: match self.shape {
+                    ObjectShape::Box => Shape::Box { size_m: size_m.map(fixed) },
+                    ObjectShape::Cylinder => {
+                        Shape::Cylinder { radius_m: fixed(size_m[0]), height_m: fixed(size_m[1]) }
+                    }
+                    ObjectShape::Sphere => Shape::Sphere { radius_m: fixed(size_m[0]) },
+                },
+                mass_kg: uncertain(MASS_KG),
+                com_m: [fixed(0.0); 3],
+                inertia_kgm2: None,
+                restitution: None,
+            },
+            noise: Noise {
+                object_position_m: Some(0.0005 * self.noise),
+                object_orientation_rad: Some(0.003 * self.noise),
+                tool_position_m: Some(0.0001 * self.noise),
+                wrist_force_n: Some(0.05 * self.noise),
+                wrist_torque_nm: Some(0.002 * self.noise),
+                joint_position_rad: arm.then_some(0.0002 * self.noise),
+                joint_torque_nm: arm.then_some(0.02 * self.noise),
+                ..Noise::default()
+            },
+            split: SplitConfig { holdout_fraction: 0.3 },
+        }
+    }
+
+    /// The true header: as the log's, with what is true of mass and friction, and no doubt.
+    #[must_use]
+    pub fn true_header(&self) -> Header {
+        let mut header = self.header();
+        header.table.friction = Number::Fixed(FRICTION * self.nominal_errors[1]);
+        header.object.mass_kg = Number::Fixed(MASS_KG * self.nominal_errors[0]);
+        header
+    }
+}
+
+/// Why a set cannot be.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GenerateError {
+    /// The arm cannot be read.
+    #[error(transparent)]
+    Tool(#[from] discrepancy::Error),
+    /// The true world goes where no log does.
+    #[error("episode {episode}: {source}")]
+    World {
+        /// Which.
+        episode: usize,
+        /// Why.
+        source: Box<RigError>,
+    },
+}
+
+/// The log of a set. `root`: folder of the project, for arms.
 ///
-/// # Panics
+/// # Errors
 ///
-/// Where the true world diverges: a set whose effects cannot be.
-#[must_use]
-pub fn generate(spec: &SetSpec) -> Log {
-    let size_m = match spec.shape {
-        ObjectShape::Box => [0.08, 0.06, 0.05],
-        ObjectShape::Cylinder => [0.035, 0.05, 0.0],
-        ObjectShape::Sphere => [0.03, 0.0, 0.0],
-    };
-    let half_height_m = spec.shape.half_height_m(size_m);
-    let reach_m = spec.shape.footprint_radius_m(size_m);
-    let scene = Scene {
-        period_secs: PERIOD_SECS,
-        tool_height_m: half_height_m.min(0.03),
-        touch_m: reach_m + TOOL_RADIUS_M,
-        half_width_m: if spec.shape == ObjectShape::Box { 0.03 } else { 0.7 * reach_m },
-        centre_m: [0.0, 0.0],
-    };
-    let seed = Seed(spec.seed);
-    let mut rng = seed.stream(Purpose::World, 0);
-    let scripts = match spec.actions {
-        Actions::Designed => designed(&scene, &mut rng),
-        Actions::Passive => passive(&scene, &mut rng),
+/// [`GenerateError`]: a true world that cannot be, to be drawn anew, or an arm that cannot be read.
+pub fn generate(spec: &SetSpec, root: Option<&Path>) -> Result<Log, GenerateError> {
+    let header = spec.header();
+    let (_, table_height_m) = spec.geometry();
+    let tool = match (spec.robot, &spec.unknown) {
+        (RobotName::None, Some(Unknown::ToolRadius { radius_m })) => RigTool::Ball { radius_m: *radius_m },
+        (RobotName::None, _) => RigTool::Ball { radius_m: spec.geometry().0 },
+        (RobotName::Sawyer, _) => {
+            discrepancy::rig_tool(&Log { header: header.clone(), episodes: Vec::new() }, root)?
+        }
     };
     let (refinement, iterations, frequency) = spec.engine;
     let rig = Rig {
@@ -86,7 +248,7 @@ pub fn generate(spec: &SetSpec) -> Log {
             solver_iterations: iterations,
             contact_frequency_hz: frequency,
             contact_damping_ratio: 5.0,
-            table_height_m: 0.0,
+            table_height_m,
             gravity_mps2: 9.81,
             tool_friction: TOOL_FRICTION,
             obstacle_friction: 0.5,
@@ -95,77 +257,49 @@ pub fn generate(spec: &SetSpec) -> Log {
             obstacle_mobility: ObstacleMobility::Movable,
         },
         tick_steps: refinement,
-        tool: RigTool::Ball { radius_m: TOOL_RADIUS_M },
+        tool,
     };
-    let shape = RigShape::Solid { shape: spec.shape, size_m };
-    let noise = Noise {
-        object_position_m: Some(0.0005 * spec.noise),
-        object_orientation_rad: Some(0.003 * spec.noise),
-        tool_position_m: Some(0.0001 * spec.noise),
-        wrist_force_n: Some(0.05 * spec.noise),
-        wrist_torque_nm: Some(0.002 * spec.noise),
-        ..Noise::default()
-    };
-    let effects: Vec<Box<dyn Effect>> = spec.effects.iter().map(EffectConfig::build).collect();
-    let episodes = scripts
-        .iter()
-        .enumerate()
-        .map(|(index, script)| {
-            let mut object =
-                RigObject::new(shape.clone(), MASS_KG * spec.nominal_errors[0], FRICTION * spec.nominal_errors[1]);
-            object.added_mass_kg = script.added_mass_kg;
-            let mut rng = seed.stream(Purpose::Truth, index as u64);
-            episode(index as u64, &rig, &object, &effects, script, half_height_m, &noise, &mut rng)
-        })
-        .collect();
-    let fixed = Number::Fixed;
-    let header = Header {
-        robot: Robot::None,
-        period_secs: PERIOD_SECS,
-        tool_radius_m: Some(TOOL_RADIUS_M),
-        tool_friction: Some(fixed(TOOL_FRICTION)),
-        gravity_mps2: 9.81,
-        table: Table { height_m: fixed(0.0), friction: Number::Uncertain { mean: FRICTION, stddev: 0.15 * FRICTION } },
-        object: Object {
-            shape: match spec.shape {
-                ObjectShape::Box => Shape::Box { size_m: size_m.map(fixed) },
-                ObjectShape::Cylinder => Shape::Cylinder { radius_m: fixed(size_m[0]), height_m: fixed(size_m[1]) },
-                ObjectShape::Sphere => Shape::Sphere { radius_m: fixed(size_m[0]) },
-            },
-            mass_kg: Number::Uncertain { mean: MASS_KG, stddev: 0.15 * MASS_KG },
-            com_m: [fixed(0.0); 3],
-            inertia_kgm2: None,
-            restitution: None,
-        },
-        noise,
-        split: SplitConfig { holdout_fraction: 0.3 },
-    };
-    Log { header, episodes }
+    let shape = RigShape::Solid { shape: spec.shape, size_m: spec.size_m() };
+    let height_m = table_height_m + spec.shape.half_height_m(spec.size_m());
+    let [mass, friction] = spec.nominal_errors;
+    let mut episodes = Vec::new();
+    for (index, script) in spec.scripts().iter().enumerate() {
+        let mut object = RigObject::new(shape.clone(), MASS_KG * mass, FRICTION * friction);
+        object.added_mass_kg = script.added_mass_kg;
+        let effects: Vec<Box<dyn Effect>> =
+            spec.effects.iter().map(EffectConfig::build).chain(spec.unknown.iter().map(Unknown::build)).collect();
+        let [x, y] = script.place_m;
+        let body = BodyState::at_rest([x, y, height_m + script.lift_m], script.yaw_rad);
+        let seen = physics_model::effect::signal::read(&effects, &body);
+        let start = RigStart::of_episode(seen, Some(script.commands[0]));
+        let readings = rig
+            .run(&object, &effects, &start, &script.commands[1..])
+            .map_err(|source| GenerateError::World { episode: index, source: Box::new(source) })?;
+        let mut rng = Seed(spec.seed).stream(Purpose::Truth, index as u64);
+        episodes.push(record(index as u64, &header, script, seen, &readings, &mut rng));
+    }
+    Ok(Log { header, episodes })
 }
 
-#[expect(clippy::too_many_arguments, reason = "one caller")]
-fn episode(
+/// What the sensors say.
+fn record(
     id: u64,
-    rig: &Rig,
-    object: &RigObject,
-    effects: &[Box<dyn Effect>],
+    header: &Header,
     script: &Script,
-    half_height_m: f64,
-    noise: &Noise,
+    seen: BodyState,
+    readings: &[RigReading],
     rng: &mut pomdp::Rng,
 ) -> Episode {
-    let [x, y] = script.place_m;
-    let body = BodyState::at_rest([x, y, half_height_m + script.lift_m], script.yaw_rad);
-    let seen = physics_model::effect::signal::read(effects, &body);
-    let start = RigStart::of_episode(seen, Some(script.commands[0]));
-    let readings = rig.run(object, effects, &start, &script.commands[1..]).expect("a true world that is one");
+    let noise = &header.noise;
     let mut normal = |stddev: Option<f64>| {
         let z: f64 = StandardNormal.sample(rng);
         z * stddev.unwrap_or(0.0)
     };
+    let stopped = readings.iter().position(|reading| reading.wrench.force_magnitude_n() > STOP_N);
+    let rows = stopped.map_or(script.commands.len(), |tick| (tick + 1).max(LEAST_ROWS).min(script.commands.len()));
     let mut channels: BTreeMap<Channel, Readings> = BTreeMap::new();
     let mut push = |channel: Channel, value: Option<f64>| channels.entry(channel).or_default().push(value);
-    for (row, command) in script.commands.iter().enumerate() {
+    for (row, command) in script.commands[..rows].iter().enumerate() {
         let reading = row.checked_sub(1).map(|row| &readings[row]);
         let (object, tool) = reading.map_or((seen, *command), |r| (r.object, r.tool_m.unwrap_or(*command)));
         let turn = Vector3::from_fn(|_, _| normal(noise.object_orientation_rad));
@@ -180,11 +314,17 @@ fn episode(
             push(Channel::WristTorque(axis), wrench.map(|w| w.1 + normal(noise.wrist_torque_nm)));
             push(Channel::ObjectPosition(axis), Some(object.position_m[i] + normal(noise.object_position_m)));
         }
+        for joint in 0..header.robot.joints() {
+            let place = usize::from(joint);
+            let read = reading.map(|r| (r.joints_rad[place], r.joint_torque_nm[place]));
+            push(Channel::Joint(joint), read.map(|r| r.0 + normal(noise.joint_position_rad)));
+            push(Channel::JointTorque(joint), read.map(|r| r.1 + normal(noise.joint_torque_nm)));
+        }
         for (component, value) in Component::ALL.into_iter().zip([q.i, q.j, q.k, q.w]) {
             push(Channel::ObjectOrientation(component), Some(value));
         }
         push(Channel::AddedMass, Some(script.added_mass_kg));
     }
-    let time_secs = (0..script.commands.len()).map(|row| row as f64 * PERIOD_SECS).collect();
+    let time_secs = (0..rows).map(|row| row as f64 * PERIOD_SECS).collect();
     Episode { id, time_secs, action: None, channels }
 }

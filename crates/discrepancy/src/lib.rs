@@ -20,6 +20,7 @@ pub mod diagnosis;
 mod error;
 pub mod evidence;
 pub mod fit;
+pub mod heldout;
 pub mod interval;
 pub mod locate;
 pub mod model;

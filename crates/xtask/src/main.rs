@@ -34,6 +34,9 @@ enum Verb {
     /// Finds where a log and the simulation disagree and names the missing effect.
     #[command(disable_help_flag = true)]
     Diagnose(Rest),
+    /// Has diagnose explain generated logs whose hidden effect it cannot know, and scores its answers.
+    #[command(disable_help_flag = true)]
+    DiagnoseBenchmark(Rest),
     /// Times the parts and checks their accuracy, beside peers where those are installed.
     #[command(disable_help_flag = true)]
     Bench(Rest),
@@ -56,6 +59,7 @@ fn main() -> ExitCode {
         Verb::Eval(rest) => program("eval", &rest.arguments),
         Verb::ImportLog(rest) => program("import-log", &rest.arguments),
         Verb::Diagnose(rest) => program("diagnose", &rest.arguments),
+        Verb::DiagnoseBenchmark(rest) => program("diagnose-benchmark", &rest.arguments),
         Verb::Bench(rest) => program("bench", &rest.arguments),
         Verb::Ci => ci(),
     };

@@ -1,0 +1,189 @@
+//! `cargo xtask diagnose-benchmark`: how well `diagnose` names what only the scorer knows.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use anyhow::{Context as _, Result};
+use clap::Parser;
+use diagnose_benchmark::folder::{Folder, Identity, name, save};
+use diagnose_benchmark::generate::Actions;
+use diagnose_benchmark::plan::{Options, Plan, VERSION};
+use diagnose_benchmark::score::{Score, score};
+use diagnose_benchmark::table::{Table, sets_to_csv};
+use indicatif::{ProgressBar, ProgressStyle};
+use physics_model::EffectKind;
+use rayon::prelude::*;
+use whole_file::Existing;
+
+/// Generates logs with a hidden effect, has diagnose explain them, and scores its answers.
+#[derive(Debug, Parser)]
+#[command(name = "diagnose-benchmark", version)]
+struct Arguments {
+    /// Sets with an effect of the catalogue, of each kind of actions.
+    #[arg(long, default_value_t = 204)]
+    sets: u32,
+    /// Sets without an effect, of each kind of actions.
+    #[arg(long, default_value_t = 100)]
+    none: u32,
+    /// Sets with an effect outside the catalogue, of each kind of actions.
+    #[arg(long, default_value_t = 40)]
+    unknown: u32,
+    /// Sets with two effects, of each kind of actions.
+    #[arg(long, default_value_t = 40)]
+    pairs: u32,
+    /// Kinds of actions.
+    #[arg(long, value_delimiter = ',', value_enum, default_values = ["designed", "passive"])]
+    actions: Vec<Actions>,
+    /// Effects of the catalogue, separated by commas [default: all].
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<EffectKind>,
+    /// Root seed.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder of the benchmark.
+    #[arg(long, default_value = "runs/diagnose-benchmark")]
+    out: PathBuf,
+    /// Sets at a time [default: all cores]; logs and answers do not depend on it.
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Scores what is answered, and answers nothing.
+    #[arg(long)]
+    score_only: bool,
+    /// Adds what simple programs reach.
+    #[arg(long)]
+    baselines: bool,
+    /// The solver [default: diagnose beside this program].
+    #[arg(long)]
+    diagnose: Option<PathBuf>,
+    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+/// What went wrong after the input was found to be good.
+#[derive(Debug)]
+struct Failed;
+
+impl std::fmt::Display for Failed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("the benchmark stopped, finished sets are kept")
+    }
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => {
+            eprintln!("interrupted: finished sets are kept, run the same command again to go on");
+            ExitCode::from(130)
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<bool> {
+    let options = Options {
+        version: VERSION,
+        seed: arguments.seed,
+        sets: arguments.sets,
+        none: arguments.none,
+        unknown: arguments.unknown,
+        pairs: arguments.pairs,
+        actions: arguments.actions.clone(),
+        only: arguments.only.clone(),
+    };
+    let diagnose = match &arguments.diagnose {
+        Some(path) => path.clone(),
+        None => std::env::current_exe().context("cannot find this program")?.with_file_name("diagnose"),
+    };
+    let solver = match std::fs::read(&diagnose) {
+        Ok(bytes) => blake3::hash(&bytes).to_hex().to_string(),
+        Err(_) if arguments.score_only => String::new(),
+        Err(error) => return Err(error).with_context(|| format!("cannot read the solver {}", diagnose.display())),
+    };
+    let identity = Identity { options: options.clone(), project: env!("CARGO_PKG_VERSION").into(), solver };
+    let folder = Folder::open(&arguments.out, &identity, arguments.score_only)?;
+    let plan = Plan::new(options);
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
+    let threads = arguments.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads")?;
+    let arms = arguments.root.as_deref();
+    if !arguments.score_only && !answer(&folder, &plan, &diagnose, arms, &pool, &interrupted)? {
+        return Ok(false);
+    }
+    let results: Vec<Result<Option<Score>>> =
+        pool.install(|| (0..plan.len()).into_par_iter().with_max_len(1).map(|set| score(&folder, set, arms)).collect());
+    let scores: Vec<Score> =
+        results.into_iter().filter_map(Result::transpose).collect::<Result<_>>().context(Failed)?;
+    let table = Table::new(&scores, plan.len() - scores.len(), arguments.baselines);
+    write(&folder, &table, &scores).context(Failed)?;
+    print!("{}\n{}", table.to_markdown(), table.confusion_to_markdown());
+    eprintln!("written to {}", arguments.out.display());
+    Ok(true)
+}
+
+/// Generates and answers what is missing; false where it was interrupted.
+fn answer(
+    folder: &Folder,
+    plan: &Plan,
+    diagnose: &Path,
+    arms: Option<&Path>,
+    pool: &rayon::ThreadPool,
+    interrupted: &AtomicBool,
+) -> Result<bool> {
+    let missing: Vec<usize> =
+        (0..plan.len()).filter(|set| !folder.is_answered(*set) || !folder.truth(*set).exists()).collect();
+    if missing.len() < plan.len() {
+        eprintln!("{} sets are finished already", plan.len() - missing.len());
+    }
+    let bar = ProgressBar::new(missing.len() as u64);
+    let style = "{bar:40} {pos}/{len} sets, {per_sec}, {eta} left {msg}";
+    bar.set_style(ProgressStyle::with_template(style).context("the template of the bar")?);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let one = |set: &usize| {
+        if interrupted.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        let done = folder.generate(plan, *set, arms).and_then(|()| folder.solve(diagnose, *set, arms));
+        bar.inc(1);
+        if let Err(error) = done {
+            // An interrupt ends the solvers too.
+            if interrupted.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            bar.suspend(|| eprintln!("{}: {error:#}", name(*set)));
+            return Err(error);
+        }
+        Ok(())
+    };
+    let results: Vec<Result<()>> = pool.install(|| missing.par_iter().with_max_len(1).map(one).collect());
+    bar.finish_and_clear();
+    if interrupted.load(Ordering::Relaxed) {
+        return Ok(false);
+    }
+    results.into_iter().collect::<Result<Vec<()>>>().context(Failed)?;
+    Ok(true)
+}
+
+fn write(folder: &Folder, table: &Table, scores: &[Score]) -> Result<()> {
+    let root = folder.root();
+    save(&root.join("table.json"), table)?;
+    for (file, text) in [
+        ("table.md", table.to_markdown()),
+        ("table.csv", table.to_csv()),
+        ("confusion.md", table.confusion_to_markdown()),
+        ("confusion.csv", table.confusion_to_csv()),
+        ("sets.csv", sets_to_csv(scores)),
+    ] {
+        whole_file::write(&root.join(file), text.as_bytes(), Existing::Replace)?;
+    }
+    Ok(())
+}

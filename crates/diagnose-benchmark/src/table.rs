@@ -1,0 +1,344 @@
+//! All scores in one table, with what is aimed at beside each figure.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use crate::generate::Actions;
+use crate::plan::Group;
+use crate::score::Score;
+
+/// A cell: a share with its interval, or a plain value.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cell {
+    /// So many of so many, with the 95 % Wilson interval.
+    Share {
+        /// Hits.
+        hits: u32,
+        /// Of.
+        of: u32,
+        /// Interval.
+        wilson95: [f64; 2],
+    },
+    /// A quantile of so many.
+    Value {
+        /// Value.
+        value: f64,
+        /// Of.
+        of: u32,
+    },
+}
+
+/// A figure for both kinds of actions.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// What.
+    pub figure: String,
+    /// Aim for designed actions and passive logs.
+    pub target: [String; 2],
+    /// Designed.
+    pub designed: Option<Cell>,
+    /// Passive.
+    pub passive: Option<Cell>,
+}
+
+/// The table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Table {
+    /// Sets without an answer.
+    pub unanswered: usize,
+    /// Rows.
+    pub rows: Vec<Row>,
+    /// Rows of the baselines.
+    pub baselines: Vec<Row>,
+    /// For both kinds of actions: truth, answer, how often.
+    pub confusion: Vec<(Actions, String, String, u32)>,
+}
+
+type Figure = fn(&[&Score]) -> Option<Cell>;
+
+impl Table {
+    /// Of all scores.
+    #[must_use]
+    pub fn new(scores: &[Score], unanswered: usize, baselines: bool) -> Self {
+        let row = |(figure, designed, passive, of): (&str, &str, &str, Figure)| {
+            let cell = |actions| of(&scores.iter().filter(|score| score.actions == actions).collect::<Vec<_>>());
+            Row {
+                figure: figure.into(),
+                target: [designed.into(), passive.into()],
+                designed: cell(Actions::Designed),
+                passive: cell(Actions::Passive),
+            }
+        };
+        let mut confusion: BTreeMap<(bool, String, String), u32> = BTreeMap::new();
+        for score in scores.iter().filter(|score| score.group != Group::Pair) {
+            let key = (score.actions == Actions::Passive, score.truth[0].clone(), score.says().to_owned());
+            *confusion.entry(key).or_default() += 1;
+        }
+        let named = |(passive, truth, says), count| {
+            (if passive { Actions::Passive } else { Actions::Designed }, truth, says, count)
+        };
+        Self {
+            unanswered,
+            rows: FIGURES.into_iter().map(row).collect(),
+            baselines: if baselines { BASELINES.into_iter().map(row).collect() } else { Vec::new() },
+            confusion: confusion.into_iter().map(|(key, count)| named(key, count)).collect(),
+        }
+    }
+
+    /// As Markdown.
+    #[must_use]
+    pub fn to_markdown(&self) -> String {
+        let mut text = String::new();
+        rows_to_markdown(&mut text, "figure", &self.rows);
+        if !self.baselines.is_empty() {
+            text.push('\n');
+            rows_to_markdown(&mut text, "baseline", &self.baselines);
+        }
+        if self.unanswered > 0 {
+            let _ = writeln!(text, "\n{} sets have no answer and are not counted.", self.unanswered);
+        }
+        text
+    }
+
+    /// As CSV.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let mut text = String::from("figure,actions,target,value,hits,of,low95,high95\n");
+        for row in self.rows.iter().chain(&self.baselines) {
+            for (actions, cell, target) in
+                [("designed", row.designed, &row.target[0]), ("passive", row.passive, &row.target[1])]
+            {
+                let Some(cell) = cell else { continue };
+                let _ = write!(text, "\"{}\",{actions},\"{target}\",", row.figure);
+                let _ = match cell {
+                    Cell::Share { hits, of, wilson95: [low, high] } => {
+                        writeln!(text, "{:.4},{hits},{of},{low:.4},{high:.4}", f64::from(hits) / f64::from(of))
+                    }
+                    Cell::Value { value, of } => writeln!(text, "{value:.4},,{of},,"),
+                };
+            }
+        }
+        text
+    }
+
+    /// The confusion matrix as a list: truth, answers with their counts.
+    #[must_use]
+    pub fn confusion_to_markdown(&self) -> String {
+        let mut text = String::new();
+        for actions in [Actions::Designed, Actions::Passive] {
+            let of = || self.confusion.iter().filter(move |entry| entry.0 == actions);
+            if of().next().is_none() {
+                continue;
+            }
+            let _ = writeln!(text, "| hidden, {} actions | right | said instead |\n|---|---|---|", actions.name());
+            let mut truths: Vec<&String> = of().map(|entry| &entry.1).collect();
+            truths.dedup();
+            for truth in truths {
+                let row = || of().filter(move |entry| entry.1 == *truth);
+                let total: u32 = row().map(|entry| entry.3).sum();
+                let catalogue = physics_model::EffectKind::ALL.iter().any(|kind| kind.name() == *truth);
+                let right = if catalogue || truth == "none" { truth.as_str() } else { "unknown" };
+                let hits: u32 = row().filter(|entry| entry.2 == right).map(|entry| entry.3).sum();
+                let others: Vec<String> =
+                    row().filter(|entry| entry.2 != right).map(|entry| format!("{} {}", entry.2, entry.3)).collect();
+                let _ = writeln!(text, "| {truth} | {hits}/{total} | {} |", others.join(", "));
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    /// The same as CSV.
+    #[must_use]
+    pub fn confusion_to_csv(&self) -> String {
+        let mut text = String::from("actions,truth,answer,count\n");
+        for (actions, truth, says, count) in &self.confusion {
+            let _ = writeln!(text, "{},{truth},{says},{count}", actions.name());
+        }
+        text
+    }
+}
+
+fn rows_to_markdown(text: &mut String, head: &str, rows: &[Row]) {
+    let _ = writeln!(text, "| {head} | designed | target | passive | target |\n|---|---|---|---|---|");
+    for row in rows {
+        let cell = |cell: Option<Cell>| match cell {
+            None => "–".to_owned(),
+            Some(Cell::Share { hits, of, wilson95: [low, high] }) => {
+                let share = 100.0 * f64::from(hits) / f64::from(of);
+                format!("{share:.0} % ({hits}/{of}; {:.0}–{:.0})", 100.0 * low, 100.0 * high)
+            }
+            Some(Cell::Value { value, of }) if value.abs() >= 20.0 => format!("{value:.0} (n {of})"),
+            Some(Cell::Value { value, of }) => format!("{value:.3} (n {of})"),
+        };
+        let [designed, passive] = &row.target;
+        let _ = writeln!(
+            text,
+            "| {} | {} | {designed} | {} | {passive} |",
+            row.figure,
+            cell(row.designed),
+            cell(row.passive)
+        );
+    }
+}
+
+/// The figures of the issue that asked for this, in its order, and some that explain them.
+const FIGURES: [(&str, &str, &str, Figure); 16] = [
+    ("hidden effect named first", "≥ 92 %", "≥ 85 %", |s| share(s, in_catalogue, |s| s.first)),
+    ("truth in the confusion set", "≥ 97 %", "≥ 95 %", |s| share(s, in_catalogue, |s| s.confused)),
+    ("wrong name with confidence ≥ 0.9", "≤ 3 %", "≤ 5 %", |s| share(s, in_catalogue, Score::wrong_and_sure)),
+    ("false alarm with no effect", "≤ 3 %", "≤ 5 %", |s| share(s, |s| s.group == Group::None, |s| s.verdict != "none")),
+    ("catalogue effect called unknown", "≤ 5 %", "≤ 8 %", |s| share(s, in_catalogue, |s| s.verdict == "unknown")),
+    ("catalogue effect called none", "", "", |s| share(s, in_catalogue, |s| s.verdict == "none")),
+    ("a further name beside the right one", "", "", |s| share(s, |s| in_catalogue(s) && s.first, |s| s.named.len() > 1)),
+    ("effect outside the catalogue called unknown", "≥ 85 %", "≥ 80 %", |s| {
+        share(s, |s| s.group == Group::Unknown, |s| s.verdict == "unknown")
+    }),
+    ("90 % intervals cover", "85–95 %", "85–95 %", |s| {
+        let inside: Vec<bool> = s.iter().flat_map(|s| s.covered.iter().map(|(_, inside)| *inside)).collect();
+        count(inside.iter().filter(|inside| **inside).count(), inside.len())
+    }),
+    ("gap closed, held out, relative to the true model: median", "≥ 0.95", "≥ 0.9", |s| quantile(closed(s), 0.5)),
+    ("the same: 10th percentile", "≥ 0.8", "≥ 0.7", |s| quantile(closed(s), 0.1)),
+    ("two effects, both named", "≥ 65 %", "≥ 50 %", |s| share(s, |s| s.group == Group::Pair, |s| s.both)),
+    ("rollouts a log: median", "", "", |s| quantile(s.iter().map(|s| s.rollouts as f64).collect(), 0.5)),
+    ("rollouts a log: most", "≤ 5000", "≤ 5000", |s| quantile(s.iter().map(|s| s.rollouts as f64).collect(), 1.0)),
+    ("seconds a log, one thread: median", "", "", |s| quantile(s.iter().map(|s| s.seconds).collect(), 0.5)),
+    ("seconds a log, one thread: most", "≤ 180 on 2 cores", "≤ 180 on 2 cores", |s| {
+        quantile(s.iter().map(|s| s.seconds).collect(), 1.0)
+    }),
+];
+
+/// What simple programs reach on the same logs.
+const BASELINES: [(&str, &str, &str, Figure); 6] = [
+    ("re-tune everything: hidden effect named first", "", "", |s| share(s, in_catalogue, |_| false)),
+    ("re-tune everything: gap of the untuned model closed, median", "", "", |s| {
+        quantile(from_untuned(s).map(|[_, retuned]| retuned).collect(), 0.5)
+    }),
+    ("diagnose: the same", "", "", |s| quantile(from_untuned(s).map(|[with, _]| with).collect(), 0.5)),
+    ("largest residual names: hidden effect named first", "", "", |s| {
+        share(s, in_catalogue, |score| largest_residual(s, score).is_some_and(|name| name == score.truth[0]))
+    }),
+    ("largest residual names: false alarm with no effect", "", "", |s| {
+        share(s, |s| s.group == Group::None, |score| largest_residual(s, score).is_some())
+    }),
+    ("largest residual names: effect outside the catalogue called unknown", "", "", |s| {
+        share(s, |s| s.group == Group::Unknown, |_| false)
+    }),
+];
+
+fn in_catalogue(score: &Score) -> bool {
+    score.group == Group::Catalogue
+}
+
+fn closed(scores: &[&Score]) -> Vec<f64> {
+    scores.iter().filter(|s| in_catalogue(s)).filter_map(|score| score.closed()).collect()
+}
+
+fn from_untuned(scores: &[&Score]) -> impl Iterator<Item = [f64; 2]> {
+    scores.iter().filter(|s| in_catalogue(s)).filter_map(|score| score.closed_from_untuned())
+}
+
+/// The effect that shows most often where this one's residuals are largest, learnt from all other sets; `None`: no residual is significant.
+fn largest_residual<'a>(scores: &[&'a Score], score: &Score) -> Option<&'a str> {
+    let channel = score.channel.as_ref()?;
+    let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
+    for other in scores.iter().filter(|other| in_catalogue(other) && other.set != score.set) {
+        if other.channel.as_ref() == Some(channel) {
+            *counts.entry(&other.truth[0]).or_default() += 1;
+        }
+    }
+    // The first of the alphabet where several are as frequent.
+    let most = counts.values().max()?;
+    counts.iter().find(|(_, count)| *count == most).map(|(name, _)| *name)
+}
+
+fn share(scores: &[&Score], of: fn(&Score) -> bool, hit: impl Fn(&Score) -> bool) -> Option<Cell> {
+    let of: Vec<&&Score> = scores.iter().filter(|score| of(score)).collect();
+    count(of.iter().filter(|score| hit(score)).count(), of.len())
+}
+
+fn count(hits: usize, of: usize) -> Option<Cell> {
+    let (hits, of) = (hits as u32, of as u32);
+    (of > 0).then(|| Cell::Share { hits, of, wilson95: wilson95(hits, of) })
+}
+
+fn quantile(mut values: Vec<f64>, share: f64) -> Option<Cell> {
+    values.sort_by(f64::total_cmp);
+    let last = values.len().checked_sub(1)?;
+    let at = last as f64 * share;
+    let (low, high) = (values[at.floor() as usize], values[at.ceil() as usize]);
+    Some(Cell::Value { value: low + at.fract() * (high - low), of: values.len() as u32 })
+}
+
+/// 95 % Wilson score interval (Wilson 1927).
+#[must_use]
+pub fn wilson95(hits: u32, of: u32) -> [f64; 2] {
+    if of == 0 {
+        return [0.0, 1.0];
+    }
+    let z = 1.959_963_984_540_054_f64;
+    let (n, p) = (f64::from(of), f64::from(hits) / f64::from(of));
+    let scale = 1.0 + z * z / n;
+    let center = (p + z * z / (2.0 * n)) / scale;
+    let half = z / scale * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+    [(center - half).max(0.0), (center + half).min(1.0)]
+}
+
+/// A line a set.
+#[must_use]
+pub fn sets_to_csv(scores: &[Score]) -> String {
+    let mut text = String::from(
+        "set,actions,group,truth,strength,noise,verdict,named,confidence,first,confused,heldout_before,heldout_after,heldout_true,\
+         closed,channel,rollouts,seconds\n",
+    );
+    for s in scores {
+        let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
+        let heldout = |i: usize| number(s.heldout.map(|h| h[i]));
+        let _ = writeln!(
+            text,
+            "{},{},{:?},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.1}",
+            s.set,
+            s.actions.name(),
+            s.group,
+            s.truth.join("+"),
+            s.strength,
+            s.noise,
+            s.verdict,
+            s.named.join("+"),
+            number(s.confidence),
+            s.first,
+            s.confused,
+            heldout(0),
+            heldout(1),
+            heldout(2),
+            number(s.closed()),
+            s.channel.as_deref().unwrap_or(""),
+            s.rollouts,
+            s.seconds
+        );
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wilson_intervals_are_those_of_newcombe() {
+        for (hits, of, low, high) in [(81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611)] {
+            let [a, b] = wilson95(hits, of);
+            assert!((a - low).abs() < 5e-5 && (b - high).abs() < 5e-5, "{hits}/{of}: [{a}, {b}]");
+        }
+    }
+
+    #[test]
+    fn quantiles_lie_between_neighbours() {
+        assert_eq!(quantile(vec![3.0, 1.0, 2.0, 4.0], 0.5), Some(Cell::Value { value: 2.5, of: 4 }));
+        assert_eq!(quantile(Vec::new(), 0.5), None);
+    }
+}
