@@ -87,9 +87,8 @@ pub fn avoid(scripts: &mut [Script], scene: &Scene, (place_m, radius_m): ([f64; 
             if object > object_m && tool > tool_m {
                 break;
             }
-            let by = std::array::from_fn(|axis| {
-                scene.centre_m[axis] + rng.random_range(-0.2..0.2) - script.place_m[axis]
-            });
+            let by =
+                std::array::from_fn(|axis| scene.centre_m[axis] + rng.random_range(-0.2..0.2) - script.place_m[axis]);
             script.shift(by);
         }
     }

@@ -158,9 +158,7 @@ pub fn pair(actions: Actions, rng: &mut Rng) -> [EffectKind; 2] {
         .into_iter()
         .chain(OBJECT)
         // A tilt and a constant force are told apart by known weights alone, and not at all beside each other.
-        .filter(|kind| {
-            *kind != first && identifiable(*kind, actions) && !(is_push(*kind) && is_push(first))
-        })
+        .filter(|kind| *kind != first && identifiable(*kind, actions) && !(is_push(*kind) && is_push(first)))
         .collect();
     [first, all[rng.random_range(0..all.len())]]
 }

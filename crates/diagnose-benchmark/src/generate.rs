@@ -174,9 +174,7 @@ impl SetSpec {
             object: Object {
                 shape: match self.shape {
                     ObjectShape::Box => Shape::Box { size_m: size_m.map(fixed) },
-                    ObjectShape::Cylinder => {
-                        Shape::Cylinder { radius_m: fixed(size_m[0]), height_m: fixed(size_m[1]) }
-                    }
+                    ObjectShape::Cylinder => Shape::Cylinder { radius_m: fixed(size_m[0]), height_m: fixed(size_m[1]) },
                     ObjectShape::Sphere => Shape::Sphere { radius_m: fixed(size_m[0]) },
                 },
                 mass_kg: uncertain(MASS_KG),
@@ -231,14 +229,21 @@ pub enum GenerateError {
 ///
 /// [`GenerateError`]: a true world that cannot be, to be drawn anew, or an arm that cannot be read.
 pub fn generate(spec: &SetSpec, root: Option<&Path>) -> Result<Log, GenerateError> {
+    generate_part(spec, root, usize::MAX)
+}
+
+/// Every so many episodes of [`generate`], so that about `count` remain.
+///
+/// # Errors
+///
+/// As [`generate`].
+pub fn generate_part(spec: &SetSpec, root: Option<&Path>, count: usize) -> Result<Log, GenerateError> {
     let header = spec.header();
     let (_, table_height_m) = spec.geometry();
     let tool = match (spec.robot, &spec.unknown) {
         (RobotName::None, Some(Unknown::ToolRadius { radius_m })) => RigTool::Ball { radius_m: *radius_m },
         (RobotName::None, _) => RigTool::Ball { radius_m: spec.geometry().0 },
-        (RobotName::Sawyer, _) => {
-            discrepancy::rig_tool(&Log { header: header.clone(), episodes: Vec::new() }, root)?
-        }
+        (RobotName::Sawyer, _) => discrepancy::rig_tool(&Log { header: header.clone(), episodes: Vec::new() }, root)?,
     };
     let (refinement, iterations, frequency) = spec.engine;
     let rig = Rig {
@@ -263,7 +268,8 @@ pub fn generate(spec: &SetSpec, root: Option<&Path>) -> Result<Log, GenerateErro
     let height_m = table_height_m + spec.shape.half_height_m(spec.size_m());
     let [mass, friction] = spec.nominal_errors;
     let mut episodes = Vec::new();
-    for (index, script) in spec.scripts().iter().enumerate() {
+    let scripts = spec.scripts();
+    for (index, script) in scripts.iter().enumerate().step_by((scripts.len() / count).max(1)) {
         let mut object = RigObject::new(shape.clone(), MASS_KG * mass, FRICTION * friction);
         object.added_mass_kg = script.added_mass_kg;
         let effects: Vec<Box<dyn Effect>> =

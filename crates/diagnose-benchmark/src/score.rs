@@ -130,7 +130,8 @@ impl Score {
         let named: Vec<String> = answer.effects.iter().map(|effect| effect.name.clone()).collect();
         let effect = answer.verdict == "effect";
         let first = effect && named.first() == names.first();
-        let covered = if first && truth.group == Group::Catalogue { covered(truth, &answer.effects[0]) } else { Vec::new() };
+        let covered =
+            if first && truth.group == Group::Catalogue { covered(truth, &answer.effects[0]) } else { Vec::new() };
         Self {
             set,
             actions: truth.spec.actions,

@@ -190,10 +190,14 @@ const FIGURES: [(&str, &str, &str, Figure); 16] = [
     ("hidden effect named first", "≥ 92 %", "≥ 85 %", |s| share(s, in_catalogue, |s| s.first)),
     ("truth in the confusion set", "≥ 97 %", "≥ 95 %", |s| share(s, in_catalogue, |s| s.confused)),
     ("wrong name with confidence ≥ 0.9", "≤ 3 %", "≤ 5 %", |s| share(s, in_catalogue, Score::wrong_and_sure)),
-    ("false alarm with no effect", "≤ 3 %", "≤ 5 %", |s| share(s, |s| s.group == Group::None, |s| s.verdict != "none")),
+    ("false alarm with no effect", "≤ 3 %", "≤ 5 %", |s| {
+        share(s, |s| s.group == Group::None, |s| s.verdict != "none")
+    }),
     ("catalogue effect called unknown", "≤ 5 %", "≤ 8 %", |s| share(s, in_catalogue, |s| s.verdict == "unknown")),
     ("catalogue effect called none", "", "", |s| share(s, in_catalogue, |s| s.verdict == "none")),
-    ("a further name beside the right one", "", "", |s| share(s, |s| in_catalogue(s) && s.first, |s| s.named.len() > 1)),
+    ("a further name beside the right one", "", "", |s| {
+        share(s, |s| in_catalogue(s) && s.first, |s| s.named.len() > 1)
+    }),
     ("effect outside the catalogue called unknown", "≥ 85 %", "≥ 80 %", |s| {
         share(s, |s| s.group == Group::Unknown, |s| s.verdict == "unknown")
     }),

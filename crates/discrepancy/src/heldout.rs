@@ -3,8 +3,8 @@
 use measured_log::Log;
 use nalgebra::DVector;
 
-use crate::nominal::{Engine, Nominal};
 use crate::noise::NoiseLevels;
+use crate::nominal::{Engine, Nominal};
 use crate::simulator::{Hypothesis, Simulator};
 use crate::study::Study;
 use crate::trial::Trial;
@@ -24,7 +24,8 @@ pub fn mean_squares(log: &Log, learnt_at: &Nominal, models: &[&Nominal], seed: u
     let count = study.len().max(1) as f64;
     (models.iter())
         .map(|model| {
-            let raw = Study::new(&Simulator::new(model, &trials), study.engine, study.chosen.clone()).raw(&plain(model));
+            let raw =
+                Study::new(&Simulator::new(model, &trials), study.engine, study.chosen.clone()).raw(&plain(model));
             study.white(&raw).iter().map(DVector::norm_squared).sum::<f64>() / count
         })
         .collect()
