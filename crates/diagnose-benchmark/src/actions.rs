@@ -77,11 +77,22 @@ pub fn place_obstacle(scripts: &[Script], scene: &Scene, radius_m: f64, tool_rad
     best.0
 }
 
-/// Moves what would begin in an obstacle, or send the tool into it: nobody puts an object where something stands.
+/// One script in so many ends at an obstacle: one that nothing meets cannot be found.
+const MEETS: usize = 6;
+
+/// Moves what would begin in an obstacle, or send the tool into it: nobody puts an object where something stands. Some pushes are moved to it.
 pub fn avoid(scripts: &mut [Script], scene: &Scene, (place_m, radius_m): ([f64; 2], f64), rng: &mut Rng) {
     // Touch is reach and the tool's radius, at least as much as either needs.
     let (object_m, tool_m) = (scene.touch_m + radius_m - 0.01, 0.03 + radius_m);
-    for script in scripts {
+    for (index, script) in scripts.iter_mut().enumerate() {
+        let to = script.pushed_to_m(scene.touch_m);
+        let along = [to[0] - script.place_m[0], to[1] - script.place_m[1]];
+        let length = along[0].hypot(along[1]);
+        if index % MEETS == 1 && length > 0.03 {
+            // Centres end this far apart if the obstacle gives way by 1 to 3 cm.
+            let apart = scene.touch_m - 0.02 + radius_m - rng.random_range(0.01..0.03);
+            script.shift(std::array::from_fn(|axis| place_m[axis] - apart * along[axis] / length - to[axis]));
+        }
         for _ in 0..50 {
             let (object, tool) = script.clearance_m(place_m);
             if object > object_m && tool > tool_m {
