@@ -12,6 +12,8 @@ use crate::nominal::Engine;
 use crate::simulator::{Nudge, Simulator};
 use crate::trial::{Kind, Phase};
 
+/// So many residuals with a mean square of 1 are added to each episode's.
+const FEW: f64 = 5.0;
 /// Random flips of signs.
 const FLIPS: usize = 999;
 /// Parts that an episode is cut into for the heat map.
@@ -36,8 +38,8 @@ pub struct Cell {
 
 #[derive(Default)]
 struct Sums {
-    /// Σ (r² − 1) of each episode.
-    excess: Vec<f64>,
+    /// Σ r² of each episode, and its number of residuals.
+    episodes: Vec<(f64, usize)>,
     square: f64,
     count: usize,
     times: [(f64, usize); TIMES],
@@ -45,8 +47,9 @@ struct Sums {
 
 /// The cells of a fit, the largest share first.
 ///
-/// Whether a cell stands out is judged between episodes, never between samples: an episode's excess is its own, and under the hypothesis that
-/// nothing is wrong its sign is a toss of a coin. The largest statistic of all cells under such tosses is what each is compared with.
+/// Whether a cell stands out is judged between episodes, never between samples. An episode's excess is the logarithm of its mean square, drawn
+/// towards 0 where it has few residuals, so that one odd episode does not hide what all show; under the hypothesis that nothing is wrong its sign
+/// is a toss of a coin. The largest statistic of all cells under such tosses is what each is compared with.
 #[must_use]
 pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> Vec<Cell> {
     let rolls = simulator.nominal.rolls();
@@ -61,8 +64,9 @@ pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> 
         for (block, residual) in trial.blocks.iter().zip(residuals.iter()) {
             let middle = usize::midpoint(block.first, block.end - 1);
             let sums = cells.entry((block.kind, phases[middle])).or_default();
-            sums.excess.resize(chosen.len(), 0.0);
-            sums.excess[place] += residual * residual - 1.0;
+            sums.episodes.resize(chosen.len(), (0.0, 0));
+            sums.episodes[place].0 += residual * residual;
+            sums.episodes[place].1 += 1;
             sums.square += residual * residual;
             sums.count += 1;
             let share = (trial.time_secs[middle] - trial.time_secs[0]) / end_secs;
@@ -71,10 +75,20 @@ pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> 
             time.1 += 1;
         }
     }
+    let excess: Vec<Vec<f64>> = (cells.values())
+        .map(|sums| {
+            let one = |(square, count): &(f64, usize)| ((square + FEW) / (*count as f64 + FEW)).ln();
+            sums.episodes.iter().filter(|(_, count)| *count > 0).map(one).collect()
+        })
+        .collect();
     let mut rng = Seed(seed).stream(Purpose::Statistics, 1);
     let statistic = |excess: &[f64], signs: Option<&[bool]>| {
         let value = |i: usize| if signs.is_some_and(|signs| signs[i]) { -excess[i] } else { excess[i] };
         let n = excess.len() as f64;
+        if n < 4.0 {
+            // Of three episodes one toss in eight is as good as it gets.
+            return 0.0;
+        }
         let mean = (0..excess.len()).map(value).sum::<f64>() / n;
         let square = excess.iter().map(|e| e * e).sum::<f64>() / n;
         let variance = (square - mean * mean).max(1e-12) / (n - 1.0).max(1.0);
@@ -83,14 +97,14 @@ pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> 
     let mut largest: Vec<f64> = (0..FLIPS)
         .map(|_| {
             let signs: Vec<bool> = (0..chosen.len()).map(|_| StandardUniform.sample(&mut rng)).collect();
-            cells.values().map(|sums| statistic(&sums.excess, Some(&signs))).fold(f64::NEG_INFINITY, f64::max)
+            excess.iter().map(|excess| statistic(excess, Some(&signs))).fold(f64::NEG_INFINITY, f64::max)
         })
         .collect();
     largest.sort_by(f64::total_cmp);
     let total: f64 = cells.values().map(|sums| (sums.square - sums.count as f64).max(0.0)).sum();
-    let mut list: Vec<Cell> = (cells.iter())
-        .map(|((channel, phase), sums)| {
-            let found = statistic(&sums.excess, None);
+    let mut list: Vec<Cell> = (cells.iter().zip(&excess))
+        .map(|(((channel, phase), sums), excess)| {
+            let found = statistic(excess, None);
             let beyond = FLIPS - largest.partition_point(|value| *value < found);
             Cell {
                 channel: *channel,
