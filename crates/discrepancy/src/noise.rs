@@ -1,7 +1,6 @@
 //! Standard deviations of the sensors: as `log.toml` says, else estimated from the log.
 
 use measured_log::{Log, Noise};
-use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::trial::{Kind, orientations};
 
@@ -64,11 +63,7 @@ fn estimate(log: &Log, kind: Kind, joints: usize) -> Option<f64> {
     let mut any = false;
     for episode in &log.episodes {
         if kind == Kind::ObjectOrientation {
-            let all = orientations(episode);
-            let turns: Vec<Option<UnitQuaternion<f64>>> = all
-                .iter()
-                .map(|q| q.map(|[x, y, z, w]| UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))))
-                .collect();
+            let turns = orientations(episode);
             any |= turns.iter().any(Option::is_some);
             for window in turns.windows(3) {
                 if let [Some(a), Some(b), Some(c)] = window {

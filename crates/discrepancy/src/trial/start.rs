@@ -1,0 +1,111 @@
+//! What an episode starts from and is driven by.
+
+use measured_log::{Axis, Channel, Episode};
+use nalgebra::{UnitQuaternion, Vector3};
+use physics_model::BodyState;
+
+use super::{Kind, rotation};
+use crate::noise::NoiseLevels;
+
+/// Most rows at rest that the start is averaged over.
+const REST_ROWS: usize = 50;
+/// How far, in standard deviations of the sensor, a reading at rest may be from the first ones.
+const REST_SIGMAS: f64 = 5.0;
+/// Rows that a velocity at the start is fitted to where it is not measured.
+const VELOCITY_ROWS: usize = 8;
+
+/// The command at the end of each tick, m, from the command columns, else from where the tool was measured.
+pub(super) fn commands(episode: &Episode, begin_secs: f64, period_secs: f64, ticks: usize) -> Option<Vec<[f64; 3]>> {
+    let given = |make: fn(Axis) -> Channel| {
+        let points: Vec<(f64, [f64; 3])> = (0..episode.rows())
+            .filter_map(|row| Some((episode.time_secs[row] - begin_secs, episode.vector(make, row)?)))
+            .collect();
+        (!points.is_empty()).then_some(points)
+    };
+    let points = given(Channel::Command).or_else(|| given(Channel::Tool))?;
+    let mut next = 0;
+    Some(
+        (1..=ticks)
+            .map(|tick| {
+                let time = tick as f64 * period_secs;
+                while next < points.len() && points[next].0 < time - 1e-9 {
+                    next += 1;
+                }
+                match (next.checked_sub(1).map(|i| points[i]), points.get(next)) {
+                    (_, Some((t, point))) if (t - time).abs() < 0.02 * period_secs => *point,
+                    (Some((t0, a)), Some((t1, b))) => {
+                        let share = (time - t0) / (t1 - t0);
+                        std::array::from_fn(|i| a[i] + share * (b[i] - a[i]))
+                    }
+                    (Some((_, point)), None) => point,
+                    (None, Some((_, point))) => *point,
+                    (None, None) => unreachable!("there is a point"),
+                }
+            })
+            .collect(),
+    )
+}
+
+/// The object at the start, and the standard deviations of its position, orientation, velocity and angular velocity.
+pub(super) fn start(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState, [f64; 4])> {
+    let first: [f64; 3] = episode.vector(Channel::ObjectPosition, 0)?;
+    let attitude = rotation(episode.orientation(0).unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let (sigma_m, sigma_rad) = (noise.of(Kind::ObjectPosition)?, noise.of(Kind::ObjectOrientation).unwrap_or(0.0));
+    let state = |position_m: Vector3<f64>, turn: Vector3<f64>, linear_mps, angular_rps| {
+        let q = UnitQuaternion::from_scaled_axis(turn) * attitude;
+        BodyState { position_m: position_m.into(), orientation: [q.i, q.j, q.k, q.w], linear_mps, angular_rps }
+    };
+    let here = Vector3::from(first);
+    if let (Some(linear), Some(angular)) =
+        (episode.vector(Channel::ObjectVelocity, 0), episode.vector(Channel::ObjectSpin, 0))
+    {
+        let moving = Vector3::from(linear).norm() > 0.0 || Vector3::from(angular).norm() > 0.0;
+        if moving {
+            let speed = noise.of(Kind::ObjectVelocity).unwrap_or(0.0);
+            let spin = noise.of(Kind::ObjectSpin).unwrap_or(0.0);
+            return Some((state(here, Vector3::zeros(), linear, angular), [sigma_m, sigma_rad, speed, spin]));
+        }
+    }
+    // At rest: the mean of what was read before anything moved.
+    let poses: Vec<(f64, Vector3<f64>, Vector3<f64>)> = (0..episode.rows().min(REST_ROWS))
+        .map_while(|row| {
+            let place = Vector3::from(episode.vector(Channel::ObjectPosition, row)?);
+            let turn = episode
+                .orientation(row)
+                .map_or_else(Vector3::zeros, |q| (rotation(q) * attitude.inverse()).scaled_axis());
+            Some((episode.time_secs[row] - episode.time_secs[0], place, turn))
+        })
+        .collect();
+    let resting = poses.iter().take_while(|(_, place, _)| (place - here).amax() < REST_SIGMAS * sigma_m).count();
+    if resting > VELOCITY_ROWS / 2 {
+        // The later half may already be moving by less than what shows.
+        let kept = if resting == poses.len() { resting } else { (resting / 2).max(1) };
+        let n = kept as f64;
+        let place = poses[..kept].iter().map(|pose| pose.1).sum::<Vector3<f64>>() / n;
+        let turn = poses[..kept].iter().map(|pose| pose.2).sum::<Vector3<f64>>() / n;
+        let start = state(place, turn, [0.0; 3], [0.0; 3]);
+        return Some((start, [sigma_m / n.sqrt(), sigma_rad / n.sqrt(), 0.0, 0.0]));
+    }
+    // In motion: a parabola through the first poses; its constant and its slope.
+    let rows = &poses[..poses.len().min(VELOCITY_ROWS)];
+    if rows.len() < 4 {
+        return Some((state(here, Vector3::zeros(), [0.0; 3], [0.0; 3]), [sigma_m, sigma_rad, 0.0, 0.0]));
+    }
+    let design = nalgebra::DMatrix::from_fn(rows.len(), 3, |i, j| rows[i].0.powi(j as i32));
+    let inverse = (design.transpose() * &design).try_inverse()?;
+    let fit = |pick: &dyn Fn(usize) -> f64| {
+        let values = nalgebra::DVector::from_fn(rows.len(), |i, _| pick(i));
+        let solution = &inverse * design.transpose() * values;
+        (solution[0], solution[1])
+    };
+    let place: [(f64, f64); 3] = std::array::from_fn(|axis| fit(&|i| rows[i].1[axis]));
+    let turn: [(f64, f64); 3] = std::array::from_fn(|axis| fit(&|i| rows[i].2[axis]));
+    let (constant, slope) = (inverse[(0, 0)].sqrt(), inverse[(1, 1)].sqrt());
+    let start = state(
+        Vector3::from(place.map(|fit| fit.0)),
+        Vector3::from(turn.map(|fit| fit.0)),
+        place.map(|fit| fit.1),
+        turn.map(|fit| fit.1),
+    );
+    Some((start, [sigma_m * constant, sigma_rad * constant, sigma_m * slope, sigma_rad * slope]))
+}
