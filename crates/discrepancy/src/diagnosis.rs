@@ -162,7 +162,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let first = fit(&search.study, model.clone(), Begin::at(&vec![0.0; tunables]), Effort::Quick);
     search.learn_errors(&first);
     let null = fit(&search.study, model, Begin::at(&first.x), Effort::Full);
-    let context = context(&simulator, &null, log, nominal);
+    let context = context(&simulator, &null, log, &noise);
     let screening = Screening::new(&search.study, &null, &candidates(&context));
 
     let mut accepted = null.clone();
@@ -211,7 +211,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         model: accepted,
         rounds,
         heldout,
-        heldout_count: search.kept.len(),
+        heldout_count: search.kept.count(),
         heldout_episodes,
         mean_squares,
         tunables: nominal.tunables.clone(),
@@ -352,10 +352,10 @@ fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
 }
 
 /// Where the object went and what the log has.
-fn context(simulator: &Simulator, null: &Fit, log: &Log, nominal: &Nominal) -> Context {
+fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
+    let nominal = simulator.nominal;
     let engine = Engine::default();
     let (world, theta) = nominal.rig(&null.x, &engine).nominal(&nominal.object(&null.x, 0.0, &engine));
-    let noise = NoiseLevels::of_log(log);
     let has = |kind: Kind| noise.of(kind).is_some();
     let mut path: Vec<[f64; 2]> = Vec::new();
     let mut largest_force_n = 0.0_f64;

@@ -21,7 +21,7 @@ pub fn mean_squares(log: &Log, learnt_at: &Nominal, models: &[&Nominal], seed: u
     let simulator = Simulator::new(learnt_at, &trials);
     let mut study = Study::new(&simulator, Engine::default(), (0..trials.len()).collect());
     study.learn_errors(&plain(learnt_at));
-    let count = study.len().max(1) as f64;
+    let count = study.count().max(1) as f64;
     (models.iter())
         .map(|model| {
             let raw =

@@ -34,14 +34,8 @@ impl Model {
 
     /// Number of coordinates.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.tunables + self.parts.iter().map(|part| part.coordinates.len()).sum::<usize>()
-    }
-
-    /// Whether there is nothing to fit.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Range of a coordinate.
@@ -83,7 +77,7 @@ impl Model {
     /// What the prior says beyond N(0, 1): a coordinate that is looked for on one side alone has twice the density there.
     #[must_use]
     pub fn one_sided(&self) -> usize {
-        (self.tunables..self.len())
+        (self.tunables..self.count())
             .filter(|index| {
                 let [low, high] = self.range(*index);
                 low == 0.0 || high == 0.0

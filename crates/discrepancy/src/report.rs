@@ -144,7 +144,8 @@ impl Report {
         let [limit, share] = settings.unexplained;
         let failing = diagnosis.mean_squares.iter().filter(|mean_square| **mean_square > limit).count();
         let unexplained = failing as f64 > share * diagnosis.mean_squares.len() as f64 && closed_fraction < CLOSED;
-        let effects = effects(diagnosis, settings);
+        let samples = bootstrap(&diagnosis.model, settings.seed);
+        let effects = effects(diagnosis, &samples);
         let verdict = match (unexplained, effects.is_empty()) {
             (true, _) => Verdict::Unknown,
             (false, true) => Verdict::None,
@@ -171,7 +172,7 @@ impl Report {
                 unit: "chi2 per sample",
                 episodes: diagnosis.heldout_episodes.clone(),
             },
-            retuned: retuned(diagnosis, settings),
+            retuned: retuned(diagnosis, &samples),
             effects,
             evidence: diagnosis.evidence.clone(),
             rollouts: diagnosis.rollouts,
@@ -180,9 +181,8 @@ impl Report {
     }
 }
 
-fn effects(diagnosis: &Diagnosis, settings: &Settings) -> Vec<NamedEffect> {
+fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
     let model = &diagnosis.model.model;
-    let samples = bootstrap(&diagnosis.model, settings.seed);
     let fitted = model.hypothesis(&diagnosis.model.x).effects;
     let resampled: Vec<_> = samples.iter().map(|x| model.hypothesis(x).effects).collect();
     (model.parts.iter().enumerate())
@@ -243,8 +243,7 @@ fn ranking(diagnosis: &Diagnosis, count: f64) -> Vec<RankedEffect> {
         .collect()
 }
 
-fn retuned(diagnosis: &Diagnosis, settings: &Settings) -> Vec<Retuned> {
-    let samples = bootstrap(&diagnosis.model, settings.seed);
+fn retuned(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<Retuned> {
     (diagnosis.tunables.iter().enumerate())
         .map(|(index, tunable)| Retuned {
             key: tunable.key.clone(),

@@ -97,14 +97,8 @@ impl<'a> Study<'a> {
 
     /// Number of residuals.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.chosen.iter().map(|index| self.simulator.trials[*index].blocks.len()).sum()
-    }
-
-    /// Whether there is nothing to compare.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
