@@ -135,6 +135,8 @@ impl Comparison {
 /// What decided a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Source {
+    /// Commit of the checkout that played it.
+    pub commit: String,
     /// Hash of the resolved scenario.
     pub scenario_hash: String,
     /// Hash of the arm's URDF file.
@@ -156,8 +158,6 @@ pub struct Source {
 pub struct Common {
     /// Version of this file's format.
     pub version: u32,
-    /// Commit of the checkout.
-    pub commit: String,
     /// Root seed.
     pub seed: u64,
     /// Whether budgets were those of a trial run.
@@ -315,6 +315,7 @@ fn cells(parts: &[Part], domain: &str, first: &Arm, second: &Arm) -> Option<Cell
 fn source(part: &Part) -> Source {
     let provenance = &part.table.provenance;
     Source {
+        commit: provenance.run.commit.clone(),
         scenario_hash: provenance.run.scenario_hash.clone(),
         urdf_hash: provenance.run.urdf_hash.clone(),
         prior_hash: provenance.run.prior_hash.clone(),

@@ -112,6 +112,18 @@ impl Evaluation {
         }
     }
 
+    /// Takes over the commit of the run in `folder`, if it is the same run in all else and finished.
+    ///
+    /// # Errors
+    ///
+    /// Records that cannot be read.
+    pub fn adopt(&mut self, folder: &Path) -> Result<(), Error> {
+        if let Some(commit) = crate::run::finished_by(folder, &self.provenance)? {
+            self.provenance.run.commit = commit;
+        }
+        Ok(())
+    }
+
     /// Opens or creates the run directory `folder`.
     ///
     /// # Errors

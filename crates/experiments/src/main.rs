@@ -29,6 +29,9 @@ struct Arguments {
     /// With --all: Python with mujoco and numpy, for the runs in MuJoCo, which are left out without.
     #[arg(long, default_value = "python3", requires = "all")]
     python: String,
+    /// With --all: counts finished runs of another commit as they are, instead of refusing them; the tables name the commit of each.
+    #[arg(long, requires = "all")]
+    keep_finished: bool,
     /// With --all: copies the combined tables and pictures to assets/results.
     #[arg(long, requires = "all", conflicts_with = "quick")]
     publish: bool,
@@ -187,6 +190,7 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
         seed: arguments.seed,
         quick: arguments.quick,
         set: arguments.set.clone(),
+        keep_finished: arguments.keep_finished,
         prior: arguments.prior.clone(),
         python: arguments.python.clone(),
         timeouts: timeouts(arguments),

@@ -207,6 +207,19 @@ impl Run {
     }
 }
 
+/// The commit that played the run in `folder`, if it is this one in all else and finished.
+pub(crate) fn finished_by(folder: &Path, provenance: &Provenance) -> Result<Option<String>, Error> {
+    let Ok(text) = std::fs::read_to_string(folder.join("run.json")) else { return Ok(None) };
+    let Ok(begun) = serde_json::from_str::<RunIdentity>(&text) else { return Ok(None) };
+    let commit = begun.commit.clone();
+    if (RunIdentity { commit: provenance.run.commit.clone(), ..begun }) != provenance.run {
+        return Ok(None);
+    }
+    let played = read_trials(folder, provenance)?;
+    let all = (0..provenance.trials).all(|trial| provenance.methods.iter().all(|m| played.contains_key(&(*m, trial))));
+    Ok(all.then_some(commit))
+}
+
 /// Finished trials of a run, its workers' among them.
 fn read_trials(folder: &Path, provenance: &Provenance) -> Result<Trials, Error> {
     let file = folder.join("trials.jsonl");
@@ -327,6 +340,22 @@ pub(crate) mod tests {
         let message = Run::open(folder.path(), provenance(2), "second").unwrap_err().to_string();
         assert!(message.contains("run.json") && message.contains("`seed` is 1, this run has 2"), "{message}");
         assert_eq!(std::fs::read_to_string(folder.path().join("scenario.toml")).unwrap(), "first");
+    }
+
+    #[test]
+    fn a_finished_run_says_which_commit_played_it_and_another_or_half_a_run_does_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = Run::open(folder.path(), provenance(1), "").unwrap();
+        let mut newer = provenance(1);
+        newer.run.commit = "newer".into();
+        let items = run.missing();
+        for &(method, trial) in &items {
+            assert_eq!(finished_by(folder.path(), &newer).unwrap(), None);
+            run.keep(&record(method, trial, true)).unwrap();
+        }
+        assert_eq!(finished_by(folder.path(), &newer).unwrap(), Some("none".to_string()));
+        newer.run.seed = 2;
+        assert_eq!(finished_by(folder.path(), &newer).unwrap(), None);
     }
 
     #[test]

@@ -28,6 +28,8 @@ pub struct SuiteRequest {
     pub seed: u64,
     /// Small budgets.
     pub quick: bool,
+    /// Whether runs that are finished count as they are where another commit played them: the tables say which.
+    pub keep_finished: bool,
     /// Overrides of scenario entries for all runs, after their own.
     pub set: Vec<String>,
     /// Folder of the trained prior of both arms' runs; the default ones where `None`.
@@ -63,19 +65,16 @@ impl Suite {
     pub fn prepare(request: SuiteRequest, note: &mut dyn FnMut(&str)) -> Result<Self, Error> {
         let plan = Plan::load(&request.root)?;
         let chosen = plan.chosen(&request.only)?;
-        let common = Common {
-            version: 1,
-            commit: scenario::commit(&request.root),
-            seed: request.seed,
-            quick: request.quick,
-            set: request.set.clone(),
-        };
+        let common = Common { version: 1, seed: request.seed, quick: request.quick, set: request.set.clone() };
         let mut entries = Vec::new();
         for (item, chosen) in plan.items().into_iter().zip(chosen) {
             let folder = request.out.join(item.folder());
             // Of what is not to be played only a run that is there is of interest.
             let wanted = chosen || folder.join("run.json").exists();
-            let evaluation = if wanted { prepare(&request, &item, note)? } else { None };
+            let mut evaluation = if wanted { prepare(&request, &item, note)? } else { None };
+            if let Some(evaluation) = evaluation.as_mut().filter(|_| request.keep_finished) {
+                evaluation.adopt(&folder)?;
+            }
             entries.push(Entry { folder, chosen, evaluation });
         }
         let suite = Self { request, plan, common, entries };

@@ -127,17 +127,18 @@ impl Combined {
 
     fn sources(&self, text: &mut String) {
         let common = &self.provenance.common;
-        let _ = write!(text, "\nCommit {}, seed {}", common.commit, common.seed);
+        let _ = write!(text, "\nSeed {}", common.seed);
         if !common.set.is_empty() {
             let _ = write!(text, ", with {}", common.set.join(", "));
         }
         *text += ".\n\n";
-        table_head(text, ["run", "trials a method", "scenario", "prior", "world", "overrides"].into_iter());
+        table_head(text, ["run", "commit", "trials a method", "scenario", "prior", "world", "overrides"].into_iter());
         for (folder, source) in &self.provenance.runs {
             let short = |hash: &str| hash.chars().take(12).collect::<String>();
             let _ = writeln!(
                 text,
-                "| {folder} | {} | {} | {} | {} | {} |",
+                "| {folder} | {} | {} | {} | {} | {} | {} |",
+                source.commit,
                 source.trials,
                 short(&source.scenario_hash),
                 source.prior_hash.as_deref().map_or("–".into(), short),
