@@ -8,6 +8,8 @@ use physics_model::effect::parameter::{Parameter, Scale};
 use physics_model::effect::{EffectConfig, EffectKind};
 use physics_model::{ObjectShape, Theta};
 
+use crate::obstacle::Place;
+
 /// Of the distance from the neutral to the farthest plausible value: one standard deviation of the prior of a strength.
 const STRENGTH_SHARE: f64 = 1.0 / 1.5;
 /// Standard deviation of where something is, m, around the place that a fit begins from.
@@ -22,8 +24,8 @@ pub struct Context {
     pub theta: Theta,
     /// Places over which the object moves, m, base frame: centres of clusters.
     pub places_m: Vec<[f64; 2]>,
-    /// Places at which something may stand in the way, m.
-    pub obstacles_m: Vec<[f64; 2]>,
+    /// Where something may stand in the way.
+    pub obstacles_m: Vec<Place>,
     /// Largest force that was read, N; 0 without a sensor.
     pub largest_force_n: f64,
     /// Whether there is a tool that is commanded.
@@ -148,13 +150,13 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
 fn obstacles(context: &Context) -> Vec<Candidate> {
     let choices = EffectKind::HiddenObstacle.variants();
     let mut all = Vec::new();
-    for place in &context.obstacles_m {
+    for (place, radius_m) in &context.obstacles_m {
         for base in &choices {
             let EffectConfig::HiddenObstacle(choice) = base else { continue };
             if choice.shape != ObjectShape::Cylinder {
                 continue;
             }
-            let start = [place[0], place[1], 0.0, 0.03, 0.08, 0.0, 1.0];
+            let start = [place[0], place[1], 0.0, *radius_m, 0.08, 0.0, 1.0];
             let Ok(base) = base.with_parameters(&start) else { continue };
             let unit = |index: usize, unit: f64, range: [f64; 2]| Coordinate {
                 index,
@@ -163,8 +165,11 @@ fn obstacles(context: &Context) -> Vec<Candidate> {
                 range,
                 strength: index == 3,
             };
-            let mut coordinates =
-                vec![unit(0, 0.03, [-4.0, 4.0]), unit(1, 0.03, [-4.0, 4.0]), unit(3, 0.015, [-1.3, 4.0])];
+            let mut coordinates = vec![
+                unit(0, 0.03, [-4.0, 4.0]),
+                unit(1, 0.03, [-4.0, 4.0]),
+                unit(3, 0.015, [(0.01 - radius_m) / 0.015, 4.0]),
+            ];
             if choice.movable {
                 coordinates.push(unit(6, 0.6, [-1.5, 6.0]));
             }
@@ -263,7 +268,7 @@ mod tests {
             world,
             theta: Theta { object, obstacle: None, effects: Vec::new() },
             places_m: vec![[0.4, 0.0]],
-            obstacles_m: vec![[0.5, 0.1]],
+            obstacles_m: vec![([0.5, 0.1], 0.03)],
             largest_force_n: 10.0,
             tool: true,
             forces: true,

@@ -1,22 +1,27 @@
 //! From a log to a verdict.
 
+use std::ops::Range;
+
 use measured_log::Log;
 use nalgebra::DVector;
-use physics_model::EffectKind;
+use physics_model::{EffectKind, ObjectShape, ObjectTheta};
+use rayon::prelude::*;
 
-use crate::candidate::{Context, candidates};
+use crate::candidate::{Candidate, Context, candidates};
 use crate::error::Error;
 use crate::evidence::Evidence;
-use crate::fit::{Begin, Effort, Fit, dispersion, fit};
+use crate::fit::{Begin, Effort, Fit, cost, fit};
 use crate::interval::bootstrap;
+use crate::likelihood::episode_cost;
 use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::noise::NoiseLevels;
-use crate::nominal::{Engine, Nominal, Tunable};
+use crate::nominal::{Nominal, Tunable};
+use crate::obstacle::{self, Outlines, Place};
 use crate::screen::{Promise, Screening, shortlist};
 use crate::simulator::{Nudge, Simulator};
-use crate::study::{Study, chi2};
-use crate::trial::{Kind, Trial};
+use crate::study::Study;
+use crate::trial::{Kind, Trial, groups};
 
 /// What the search may do.
 #[derive(Clone, Debug)]
@@ -35,9 +40,10 @@ pub struct Settings {
     pub effects: usize,
     /// No further effect is looked for after this many simulated episodes.
     pub rollouts: usize,
-    /// Mean square of an episode's residuals above which the model does not explain it, and share of such episodes among all above which the model
-    /// is not the whole story.
-    pub unexplained: [f64; 2],
+    /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story.
+    pub unexplained: f64,
+    /// The same of a held-out one before anything is named, from which on what is named has to close half of its gap.
+    pub gap: f64,
 }
 
 impl Default for Settings {
@@ -47,10 +53,11 @@ impl Default for Settings {
             quick_fits: 6,
             fits: 3,
             confusion: 20.0_f64.ln(),
-            threshold: 6.0,
+            threshold: 20.0,
             effects: 2,
             rollouts: 4000,
-            unexplained: [1.3, 0.3],
+            unexplained: 1.4,
+            gap: 1.1,
         }
     }
 }
@@ -85,10 +92,10 @@ pub struct Round {
     pub promises: Vec<Promise>,
     /// The fitted ones, the most probable first.
     pub rivals: Vec<Rival>,
-    /// Sums of squares of the held-out episodes under the model that they were added to, with the same errors.
+    /// The model that they were added to, with the same errors.
+    pub base: Fit,
+    /// Sums of squares of the held-out episodes under that model.
     pub before: Vec<f64>,
-    /// Variance of the residuals of each fitted episode under the model that explains it best.
-    pub dispersion: Vec<f64>,
 }
 
 /// What a diagnosis is made of.
@@ -118,6 +125,8 @@ pub struct Diagnosis {
     pub evidence: Evidence,
     /// Simulated episodes.
     pub rollouts: usize,
+    /// Places of the pieces of each fitted episode.
+    pub pieces: Vec<Range<usize>>,
 }
 
 /// Diagnoses a log that was read from the folder `name`.
@@ -127,29 +136,29 @@ pub struct Diagnosis {
 /// [`Error::Unfit`] for a log without poses of the object, or with too few episodes that can be simulated.
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
     let noise = NoiseLevels::of_log(log);
-    let all: Vec<Option<Trial>> =
-        log.episodes.iter().map(|episode| Trial::new(log, episode, &noise, nominal.has_tool())).collect();
     let split = log.split(settings.seed);
     let mut trials = Vec::new();
     let mut sides = [Vec::new(), Vec::new()];
-    for (index, trial) in all.into_iter().enumerate() {
-        if let Some(trial) = trial {
-            sides[usize::from(split.holdout.contains(&index))].push(trials.len());
+    for (index, episode) in log.episodes.iter().enumerate() {
+        let side = &mut sides[usize::from(split.holdout.contains(&index))];
+        for trial in Trial::of_episode(log, episode, &noise, nominal.has_tool()) {
+            side.push(trials.len());
             trials.push(trial);
         }
     }
     let [fitted, heldout] = sides;
-    if fitted.len() < LEAST_FITTED || heldout.is_empty() {
+    let episodes = |side: &[usize]| groups(side.iter().map(|index| &trials[*index])).len();
+    if episodes(&fitted) < LEAST_FITTED || heldout.is_empty() {
         let reason = format!(
             "expected at least {LEAST_FITTED} episodes to fit and one held out, each with two rows and a pose of the object in the first, \
              found {} and {}",
-            fitted.len(),
-            heldout.len()
+            episodes(&fitted),
+            episodes(&heldout)
         );
         return Err(Error::Unfit { log: name.into(), reason });
     }
     let simulator = Simulator::new(nominal, &trials);
-    let engine = Engine::default();
+    let engine = nominal.engine();
     let mut search = Search {
         study: Study::new(&simulator, engine, fitted),
         kept: Study::new(&simulator, engine, heldout),
@@ -158,14 +167,17 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
 
     // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again.
     let tunables = nominal.tunables.len();
-    let model = Model::nominal(tunables);
-    let first = fit(&search.study, model.clone(), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let first = fit(&search.study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
     search.learn_errors(&first);
-    let null = fit(&search.study, model, Begin::at(&first.x), Effort::Full);
+    let model = Model::nominal(tunables, search.study.engine_errors());
+    let mut x = first.x;
+    x.resize(model.count(), 0.0);
+    let null = fit(&search.study, model, Begin::at(&x), Effort::Full);
     let context = context(&simulator, &null, log, &noise);
     let screening = Screening::new(&search.study, &null, &candidates(&context));
 
     let mut accepted = null.clone();
+    let pieces = search.study.groups();
     let counts: Vec<usize> = search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect();
     let (mut rounds, mut explained) = (Vec::new(), 0.0);
     while accepted.model.parts.len() < settings.effects {
@@ -175,8 +187,11 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         let round = search.round(&screening, &accepted);
         // The errors of a solver grow with what it is asked to explain.
         let least = settings.threshold.max(SECOND_SHARE * explained);
-        let convinces =
-            |best: &&Rival| best.gain > least && agrees(best, &round, &counts) && lasts(&best.fit, settings.seed);
+        let convinces = |best: &&Rival| {
+            best.gain > least
+                && agrees(best, &round, [&pieces, &search.kept.groups()], &counts, least)
+                && lasts(&best.fit, &pieces, settings.seed)
+        };
         let best = round.rivals.first().filter(convinces);
         let best = best.map(|best| (best.gain, best.fit.clone()));
         rounds.push(round);
@@ -186,16 +201,21 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         }
     }
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
-    let heldout_episodes = (search.kept.chosen.iter().zip(heldout[0].iter().zip(&heldout[1])))
-        .map(|(index, (before, after))| {
-            let trial = &trials[*index];
-            let count = trial.blocks.len().max(1) as f64;
-            (trial.id, before / count, after / count)
+    // Of each episode, whose pieces come one after another.
+    let heldout_episodes = (search.kept.groups().into_iter())
+        .map(|group| {
+            let count = counts[group.clone()].iter().sum::<usize>().max(1) as f64;
+            let [before, after] = [0, 1].map(|i| heldout[i][group.clone()].iter().sum::<f64>() / count);
+            (trials[search.kept.chosen[group.start]].id, before, after)
         })
-        .collect();
-    let mean_squares = accepted.residuals.iter().map(|r| r.norm_squared() / r.len().max(1) as f64);
+        .collect::<Vec<_>>();
+    let fitted_mean = |group: &Range<usize>| {
+        let residuals = &accepted.residuals[group.clone()];
+        let count: usize = residuals.iter().map(DVector::len).sum();
+        residuals.iter().map(DVector::norm_squared).sum::<f64>() / count.max(1) as f64
+    };
     let mean_squares =
-        mean_squares.chain(heldout[1].iter().zip(&counts).map(|(sum, n)| sum / (*n).max(1) as f64)).collect();
+        pieces.iter().map(fitted_mean).chain(heldout_episodes.iter().map(|(_, _, after)| *after)).collect();
     let chosen = &search.study.chosen;
     let located = locate(&simulator, chosen, &null, settings.seed);
     let remaining = if accepted.model.parts.is_empty() {
@@ -216,11 +236,16 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         mean_squares,
         tunables: nominal.tunables.clone(),
         rollouts: simulator.rollouts(),
+        pieces,
     })
 }
 
 /// Share of resamples in which a strength has to have the same sign.
 const SAME_SIGN: f64 = 0.95;
+/// By chance an effect that no held-out episode shows may explain them worse by this much in ln p.
+const HELDOUT_SLACK: f64 = 1.0;
+/// The same as a share of the gain: the place of an obstacle is not known exactly.
+const HELDOUT_SHARE: f64 = 0.02;
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.
 const LEAST_FITTED: usize = 4;
 /// What a further effect has to gain, as a share of what those before it did.
@@ -245,19 +270,19 @@ impl Search<'_> {
 
     /// Sums of squares of the held-out episodes.
     fn heldout(&self, fit: &Fit) -> Vec<f64> {
-        self.kept.white(&self.kept.raw(&fit.model.hypothesis(&fit.x))).iter().map(DVector::norm_squared).collect()
+        let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
+        self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
     }
 
     /// Compares what could be added to `base`.
     fn round(&mut self, screening: &Screening, base: &Fit) -> Round {
         let promises = screening.promises(&self.study, base);
         let mut quick = self.quick(screening, base, &promises);
+        let before = base.part(&screening.places).log_evidence();
         // How large errors are is learnt where the model is nearly right.
         let mut base = base.clone();
-        let part = base.part(&screening.places);
-        let spread = dispersion(quick.iter().chain([&part]));
         if let Some(best) = quick.first()
-            && best.log_evidence(&spread) - part.log_evidence(&spread) > FAR
+            && best.log_evidence() - before > FAR
         {
             let best = best.clone();
             self.learn_errors(&best);
@@ -265,25 +290,36 @@ impl Search<'_> {
         }
         let fits = if base.model.parts.is_empty() { self.settings.fits } else { 1 };
         quick.truncate(fits);
-        let lead = quick.first().map_or(0.0, |best| best.log_evidence(&spread));
-        let mut rivals: Vec<Rival> = quick
-            .into_iter()
-            .enumerate()
+        let lead = quick.first().map_or(0.0, Fit::log_evidence);
+        let without = base.log_evidence();
+        let share = base.residuals.len() as f64 / screening.places.len() as f64;
+        let fully = |quick: Fit| {
+            let fit = fit(&self.study, quick.model, Begin::at(&quick.x), Effort::Full);
+            Rival { heldout: self.heldout(&fit), gain: fit.log_evidence() - without, fit }
+        };
+        let mut rivals: Vec<Rival> = (quick.into_iter().enumerate())
             .map(|(rank, quick)| {
-                // The ranking of those far behind needs no exact optimum.
-                let near = lead - quick.log_evidence(&spread) < NEAR;
-                let effort = if rank == 0 || near { Effort::Full } else { Effort::Quick };
-                let fit = fit(&self.study, quick.model, Begin::at(&quick.x), effort);
-                Rival { heldout: self.heldout(&fit), fit, gain: 0.0 }
+                // Those far behind need no exact optimum: what they gain in the episodes of the screening they gain in all.
+                let gain = quick.log_evidence();
+                if rank == 0 || lead - gain < NEAR {
+                    fully(quick)
+                } else {
+                    Rival { heldout: self.heldout(&quick), fit: quick, gain: share * (gain - before) }
+                }
             })
             .collect();
-        let dispersion = dispersion(rivals.iter().map(|rival| &rival.fit).chain([&base]));
-        let without = base.log_evidence(&dispersion);
-        for rival in &mut rivals {
-            rival.gain = rival.fit.log_evidence(&dispersion) - without;
+        loop {
+            rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+            // Unless those before do not keep what they promise.
+            match rivals.first() {
+                Some(first) if first.fit.residuals.len() < self.study.chosen.len() => {
+                    let first = rivals.swap_remove(0);
+                    rivals.push(fully(first.fit));
+                }
+                _ => break,
+            }
         }
-        rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        Round { promises, rivals, before: self.heldout(&base), dispersion }
+        Round { promises, rivals, before: self.heldout(&base), base }
     }
 
     /// Fits what promises most to the episodes of the screening; the best first.
@@ -300,32 +336,53 @@ impl Search<'_> {
                 fit(&part, model, begin, Effort::Quick)
             })
             .collect();
-        let spread = dispersion(quick.iter().chain([&base]));
-        quick.sort_by(|a, b| b.log_evidence(&spread).total_cmp(&a.log_evidence(&spread)));
+        quick.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
+        // Of one kind's several places the best.
+        let mut kinds = Vec::new();
+        quick.retain(|fit| {
+            let kind = fit.model.parts.last().map(Candidate::kind);
+            let first = !kinds.contains(&kind);
+            kinds.push(kind);
+            first
+        });
         quick
     }
 }
 
 /// Whether the last effect is there whichever episodes are left out: some strength of it has the same sign in nearly all resamples.
-fn lasts(fit: &Fit, seed: u64) -> bool {
+fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
     let Some(part) = fit.model.parts.last() else { return false };
     let first = fit.x.len() - part.coordinates.len();
-    let samples = bootstrap(fit, seed);
-    part.strengths().any(|index| {
-        // A body in the way begins with a size: its absence is not at 0.
-        let absent = if part.begin.is_some() { part.coordinates[index].range[0] } else { 0.0 };
-        let above = samples.iter().filter(|x| x[first + index] > absent).count();
-        above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
-    })
+    let samples = bootstrap(fit, groups, seed);
+    // A body in the way has no sign.
+    part.begin.is_some()
+        || part.strengths().any(|index| {
+            let above = samples.iter().filter(|x| x[first + index] > 0.0).count();
+            above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
+        })
 }
 
-/// Whether what was held out is explained better too. As above, what neither explains has no say.
-fn agrees(rival: &Rival, round: &Round, counts: &[usize]) -> bool {
-    let gains = round.before.iter().zip(&rival.heldout).zip(counts).map(|((before, after), count)| {
-        let dispersion = (before.min(*after) / (*count).max(1) as f64).max(1.0);
-        (before - after) / dispersion
-    });
-    gains.sum::<f64>() > 0.0
+/// Whether what was held out is explained no worse, and the effect shows in more than one episode, whether fitted or held out: an odd one names
+/// nothing.
+fn agrees(rival: &Rival, round: &Round, study: [&[Range<usize>]; 2], counts: &[usize], least: f64) -> bool {
+    let heldout: Vec<f64> = (round.before.iter().zip(&rival.heldout).zip(counts))
+        .map(|((before, after), count)| episode_cost(*before, *count) - episode_cost(*after, *count))
+        .collect();
+    let cost = |residuals: &DVector<f64>| episode_cost(residuals.norm_squared(), residuals.len());
+    let fitted: Vec<f64> = round
+        .base
+        .residuals
+        .iter()
+        .zip(&rival.fit.residuals)
+        .map(|(before, after)| cost(before) - cost(after))
+        .collect();
+    let of_episodes = |gains: &[f64], pieces: &[Range<usize>]| -> Vec<f64> {
+        pieces.iter().map(|piece| gains[piece.clone()].iter().sum()).collect()
+    };
+    let gains = [of_episodes(&fitted, study[0]), of_episodes(&heldout, study[1])].concat();
+    let most = gains.iter().copied().fold(0.0, f64::max);
+    let slack = HELDOUT_SLACK.max(HELDOUT_SHARE * rival.gain);
+    heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * least
 }
 
 /// The linear step of the screening as far as it helps: large effects are not linear.
@@ -334,16 +391,22 @@ fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
         let own = promise.begin.iter().map(|a| if promise.candidate.begin.is_some() { *a } else { share * a });
         base.x.iter().copied().chain(own).collect()
     };
+    let promised = promise.gain * part.chosen.len() as f64 / promise.episodes as f64;
+    let before = base.cost();
     let mut best: Option<(f64, Vec<f64>, Vec<Vec<f64>>)> = None;
-    for share in [1.0, 0.4, 0.1] {
+    // From a border, where a strength may have no more effect, a fit does not find back.
+    let at_border = (promise.begin.iter().zip(&promise.candidate.coordinates))
+        .any(|(a, coordinate)| coordinate.strength && *a != 0.0 && coordinate.range.contains(a));
+    let whole = if at_border { 0.5 } else { 1.0 };
+    for share in [whole, 0.4 * whole, 0.1 * whole] {
         let x = at(share);
         let raw = part.raw(&model.hypothesis(&x));
-        let cost = 0.5 * chi2(&part.white(&raw)) + 0.5 * x.iter().map(|x| x * x).sum::<f64>();
-        let good = cost < 0.5 * base.chi2();
+        let cost = cost(&x, &part.white(&raw, model.engine_errors(&x)));
+        let good = before - cost > 0.5 * promised;
         if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
             best = Some((cost, x, raw));
         }
-        if good || promise.candidate.begin.is_some() {
+        if promise.candidate.begin.is_some() || (good && share < whole) {
             break;
         }
     }
@@ -354,7 +417,7 @@ fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
 /// Where the object went and what the log has.
 fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
     let nominal = simulator.nominal;
-    let engine = Engine::default();
+    let engine = nominal.engine();
     let (world, theta) = nominal.rig(&null.x, &engine).nominal(&nominal.object(&null.x, 0.0, &engine));
     let has = |kind: Kind| noise.of(kind).is_some();
     let mut path: Vec<[f64; 2]> = Vec::new();
@@ -371,7 +434,7 @@ fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) ->
             }
         }
     }
-    let obstacles_m = stops(simulator, null, theta.object.shape.footprint_radius_m(theta.object.size_m));
+    let obstacles_m = obstacles(simulator, null, &theta.object);
     Context {
         world,
         theta,
@@ -402,26 +465,19 @@ fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
     centres
 }
 
-/// Places where something may stand in the way: ahead of where the tool meets a force that the model does not know of, and beside where objects
-/// of `radius_m` leave the simulated path.
-fn stops(simulator: &Simulator, null: &Fit, radius_m: f64) -> Vec<[f64; 2]> {
+/// Places at which something may stand in the way.
+fn obstacles(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> Vec<Place> {
     let hypothesis = null.model.hypothesis(&null.x);
-    let mut found: Vec<(f64, [f64; 2])> = Vec::new();
-    for trial in simulator.trials {
-        let (_, readings) = simulator.readings(&hypothesis, &Engine::default(), Nudge::default(), trial);
-        found.extend(trial.blocked(&readings, AHEAD_M).filter(|(surprise_n, _)| *surprise_n > UNEXPECTED_N));
-        // A newton a millimetre, so that both kinds of surprise can be compared.
-        let deflected = trial.deflected(&readings, radius_m + OBSTACLE_M);
-        found.extend(deflected.filter(|(off_m, _)| *off_m > OFF_M).map(|(off_m, place)| (1e3 * off_m, place)));
-    }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let points: Vec<[f64; 2]> = found.iter().take(12).map(|(_, point)| *point).collect();
-    centres(&points, 4)
+    let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
+    let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
+    let [x, y, _] = object.size_m;
+    let outlines = Outlines {
+        sides_m: (object.shape == ObjectShape::Box).then_some([0.5 * x, 0.5 * y]),
+        object_m: object.shape.footprint_radius_m(object.size_m),
+        tool_m: simulator.nominal.header().tool_radius_m.unwrap_or(0.0),
+    };
+    obstacle::places(&courses, outlines, OBSTACLES)
 }
 
-/// A force, N, that no friction explains, and how far ahead, m, of tool or object the centre of an obstacle is looked for.
-const UNEXPECTED_N: f64 = 3.0;
-const AHEAD_M: f64 = 0.05;
-/// How far off, m, an object has to end, and the radius, m, of the obstacles that a fit begins with.
-const OFF_M: f64 = 0.005;
-const OBSTACLE_M: f64 = 0.03;
+/// Places that are tried for an obstacle.
+const OBSTACLES: usize = 5;

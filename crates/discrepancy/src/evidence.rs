@@ -5,8 +5,9 @@
 use serde::Serialize;
 
 use crate::fit::Fit;
+use crate::likelihood::Stack;
 use crate::simulator::Nudge;
-use crate::study::{Stack, Study};
+use crate::study::Study;
 use crate::trial::{Compared, Kind, Trial};
 
 /// Points of a course, at most.
@@ -76,7 +77,7 @@ impl Evidence {
     /// Of the held-out episodes.
     #[must_use]
     pub fn new(kept: &Study, null: &Fit, accepted: &Fit) -> Self {
-        let stack = |fit: &Fit| kept.white(&kept.raw(&fit.model.hypothesis(&fit.x)));
+        let stack = |fit: &Fit| kept.white(&kept.raw(&fit.model.hypothesis(&fit.x)), fit.model.engine_errors(&fit.x));
         let [before, after] = [stack(null), stack(accepted)];
         let trials: Vec<&Trial> = kept.chosen.iter().map(|index| &kept.simulator.trials[*index]).collect();
         let mean_square = |place: &usize| before[*place].norm_squared() / before[*place].len().max(1) as f64;

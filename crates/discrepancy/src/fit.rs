@@ -3,11 +3,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::likelihood::{self, Stack, dot, weights};
 use crate::model::Model;
-use crate::study::{Stack, Study, chi2, difference, dot};
+use crate::study::{Study, difference};
 
 /// Steps between two fresh Jacobians, at most.
-const STEPS: usize = 4;
+const STEPS: usize = 5;
 /// A step that promises less than this in ln posterior is not made.
 const WORTHWHILE: f64 = 0.05;
 
@@ -39,41 +40,25 @@ impl Fit {
         }
     }
 
-    /// Sum of squares of the white residuals.
+    /// −ln posterior there, but for a constant.
     #[must_use]
-    pub fn chi2(&self) -> f64 {
-        chi2(&self.residuals)
+    pub fn cost(&self) -> f64 {
+        cost(&self.x, &self.residuals)
     }
 
-    /// Laplace's ln evidence with residuals whose variance is `dispersion`, one for each episode: an episode in which a contact went another way
-    /// than in any model has no say about what the others show.
+    /// Laplace's ln evidence.
     #[must_use]
-    pub fn log_evidence(&self, dispersion: &[f64]) -> f64 {
-        let prior = 0.5 * self.x.iter().map(|x| x * x).sum::<f64>();
+    pub fn log_evidence(&self) -> f64 {
         let n = self.x.len();
-        let weighted = |a: &Stack, b: &Stack| -> f64 {
-            a.iter().zip(b).zip(dispersion).map(|((a, b), dispersion)| a.dot(b) / dispersion).sum()
-        };
-        let hessian =
-            DMatrix::from_fn(n, n, |i, j| weighted(&self.jacobian[i], &self.jacobian[j]) + f64::from(u8::from(i == j)));
+        let weights = weights(&self.residuals);
+        let hessian = DMatrix::from_fn(n, n, |i, j| {
+            dot(&self.jacobian[i], &self.jacobian[j], &weights) + f64::from(u8::from(i == j))
+        });
         let determinant =
             hessian.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
         let sides = self.model.one_sided() as f64 * std::f64::consts::LN_2;
-        -0.5 * weighted(&self.residuals, &self.residuals) - prior - 0.5 * determinant + sides
+        -self.cost() - 0.5 * determinant + sides
     }
-}
-
-/// Variance of the residuals of each episode under the model of `fits` that explains it best; at least 1.
-#[must_use]
-pub fn dispersion<'a>(fits: impl IntoIterator<Item = &'a Fit>) -> Vec<f64> {
-    let fits: Vec<&Fit> = fits.into_iter().collect();
-    let episodes = fits.first().map_or(0, |fit| fit.residuals.len());
-    (0..episodes)
-        .map(|t| {
-            let mean_square = |fit: &Fit| fit.residuals[t].norm_squared() / fit.residuals[t].len().max(1) as f64;
-            fits.iter().copied().map(mean_square).fold(f64::INFINITY, f64::min).max(1.0)
-        })
-        .collect()
 }
 
 fn pick(stack: &Stack, places: &[usize]) -> Stack {
@@ -113,16 +98,16 @@ impl Begin {
 pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
     let mut x = begin.x;
     let mut raw = begin.raw.unwrap_or_else(|| study.raw(&model.hypothesis(&x)));
-    let mut residuals = study.white(&raw);
+    let mut residuals = study.white(&raw, model.engine_errors(&x));
     let mut jacobian = begin.jacobian;
-    complete(study, &model, &x, &residuals, &mut jacobian);
+    complete(study, &model, &x, (&raw, &residuals), &mut jacobian);
     let rounds = match effort {
         Effort::Quick => 1,
         Effort::Full => 3,
     };
     for round in 0..rounds {
         if round > 0 {
-            jacobian = derivatives(study, &model, &x, &residuals);
+            jacobian = derivatives(study, &model, &x, (&raw, &residuals));
         }
         let mut damping = 1e-3;
         let mut moved = false;
@@ -134,9 +119,9 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             }
             let next: Vec<f64> = x.iter().zip(step.delta.iter()).map(|(x, d)| x + d).collect();
             let found_raw = study.raw(&model.hypothesis(&next));
-            let found = study.white(&found_raw);
+            let found = study.white(&found_raw, model.engine_errors(&next));
             let gain = cost(&x, &residuals) - cost(&next, &found);
-            broyden(&mut jacobian, &residuals, &found, &step.delta);
+            broyden(&model, &mut jacobian, &residuals, &found, &step.delta);
             moved = true;
             if gain > 0.0 {
                 (x, raw, residuals) = (next, found_raw, found);
@@ -150,30 +135,38 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         }
     }
     if effort == Effort::Full {
-        jacobian = derivatives(study, &model, &x, &residuals);
+        jacobian = derivatives(study, &model, &x, (&raw, &residuals));
     }
     Fit { model, x, raw, residuals, jacobian }
 }
 
 /// −ln posterior but for a constant.
-fn cost(x: &[f64], residuals: &Stack) -> f64 {
-    0.5 * chi2(residuals) + 0.5 * x.iter().map(|x| x * x).sum::<f64>()
+#[must_use]
+pub fn cost(x: &[f64], residuals: &Stack) -> f64 {
+    likelihood::cost(residuals) + 0.5 * x.iter().map(|x| x * x).sum::<f64>()
 }
 
 /// Finite differences at `x`.
-fn derivatives(study: &Study, model: &Model, x: &[f64], residuals: &Stack) -> Vec<Stack> {
+fn derivatives(study: &Study, model: &Model, x: &[f64], at: (&[Vec<f64>], &Stack)) -> Vec<Stack> {
     let mut jacobian = Vec::new();
-    complete(study, model, x, residuals, &mut jacobian);
+    complete(study, model, x, at, &mut jacobian);
     jacobian
 }
 
-/// Finite differences at `x` for the coordinates that have none yet.
-fn complete(study: &Study, model: &Model, x: &[f64], residuals: &Stack, jacobian: &mut Vec<Stack>) {
+/// Finite differences at `x` for the coordinates that have none yet. `at`: residuals there, as simulated and white.
+fn complete(study: &Study, model: &Model, x: &[f64], at: (&[Vec<f64>], &Stack), jacobian: &mut Vec<Stack>) {
+    let (raw, residuals) = at;
     for index in jacobian.len()..x.len() {
         let step = model.step(x, index);
         let mut moved = x.to_vec();
         moved[index] += step;
-        jacobian.push(difference(&study.white(&study.raw(&model.hypothesis(&moved))), residuals, step));
+        let errors = model.engine_errors(&moved);
+        let white = if model.is_engine_error(index) {
+            study.white(raw, errors)
+        } else {
+            study.white(&study.raw(&model.hypothesis(&moved)), errors)
+        };
+        jacobian.push(difference(&white, residuals, step));
     }
 }
 
@@ -186,8 +179,10 @@ struct Step {
 /// The damped Gauss–Newton step within the ranges: coordinates that it would push over a border stay there.
 fn step(model: &Model, x: &[f64], residuals: &Stack, jacobian: &[Stack], damping: f64) -> Option<Step> {
     let n = x.len();
-    let gram = DMatrix::from_fn(n, n, |i, j| dot(&jacobian[i], &jacobian[j]) + f64::from(u8::from(i == j)));
-    let slope = DVector::from_fn(n, |i, _| dot(&jacobian[i], residuals) + x[i]);
+    let weights = weights(residuals);
+    let product = |a, b| dot(a, b, &weights);
+    let gram = DMatrix::from_fn(n, n, |i, j| product(&jacobian[i], &jacobian[j]) + f64::from(u8::from(i == j)));
+    let slope = DVector::from_fn(n, |i, _| product(&jacobian[i], residuals) + x[i]);
     let mut free: Vec<usize> = (0..n).collect();
     let mut delta = DVector::zeros(n);
     loop {
@@ -236,9 +231,10 @@ fn step(model: &Model, x: &[f64], residuals: &Stack, jacobian: &[Stack], damping
     Some(Step { delta, promise })
 }
 
-/// The smallest change of the Jacobian that explains what a step did.
-fn broyden(jacobian: &mut [Stack], before: &Stack, after: &Stack, delta: &DVector<f64>) {
-    let length = delta.norm_squared();
+/// The smallest change of the Jacobian that explains what a step did. What is known exactly is left as it is.
+fn broyden(model: &Model, jacobian: &mut [Stack], before: &Stack, after: &Stack, delta: &DVector<f64>) {
+    let unsure = |index: &usize| !model.is_engine_error(*index);
+    let length = (0..delta.len()).filter(unsure).map(|index| delta[index].powi(2)).sum::<f64>();
     if length == 0.0 {
         return;
     }
@@ -247,8 +243,8 @@ fn broyden(jacobian: &mut [Stack], before: &Stack, after: &Stack, delta: &DVecto
         for (column, d) in jacobian.iter().zip(delta.iter()) {
             surprise.axpy(-d, &column[place], 1.0);
         }
-        for (column, d) in jacobian.iter_mut().zip(delta.iter()) {
-            column[place].axpy(d / length, &surprise, 1.0);
+        for index in (0..delta.len()).filter(unsure) {
+            jacobian[index][place].axpy(delta[index] / length, &surprise, 1.0);
         }
     }
 }

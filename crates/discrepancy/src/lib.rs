@@ -2,11 +2,12 @@
 //!
 //! # Method
 //!
-//! 1. A [`Trial`](trial::Trial) is an episode of the log: what a simulation starts from, and what it is compared with. Episodes run freely from
-//!    their first row, driven by the logged commands.
+//! 1. A [`Trial`](trial::Trial) is an episode of the log, or a piece of a toss: what a simulation starts from, and what it is compared with. It runs
+//!    freely from its first row, driven by the logged commands.
 //! 2. The null hypothesis is the nominal model with its uncertain numbers re-tuned within their priors ([`nominal`]).
 //! 3. A right model's residuals are not white: solvers and starts differ, and such errors last for the rest of an episode. Simulations with other
-//!    solver settings and other starts say what they look like; a [`whitener`] takes them out.
+//!    solver settings and other starts say what they look like. A [`whitener`] takes them out of each episode; those of the engine are also the
+//!    same in all episodes, and are coordinates of every [`model`]. An episode that goes another way has little say ([`likelihood`]).
 //! 4. Every effect of the catalogue gets one linear step beside re-tuning ([`screen`]); what promises most is fitted ([`fit`]), first to a part of the
 //!    episodes, then to all.
 //! 5. An effect is named if its ln evidence beats re-tuning's by a margin and held-out episodes agree ([`diagnosis`]). Then the search goes on for
@@ -22,11 +23,13 @@ pub mod evidence;
 pub mod fit;
 pub mod heldout;
 pub mod interval;
+pub mod likelihood;
 pub mod locate;
 pub mod model;
 pub mod model_file;
 pub mod noise;
 pub mod nominal;
+pub mod obstacle;
 mod page;
 pub mod report;
 pub mod screen;

@@ -8,9 +8,8 @@ use rand_distr::{Distribution as _, StandardUniform};
 use serde::Serialize;
 
 use crate::fit::Fit;
-use crate::nominal::Engine;
 use crate::simulator::{Nudge, Simulator};
-use crate::trial::{Kind, Phase};
+use crate::trial::{Kind, Phase, groups};
 
 /// So many residuals with a mean square of 1 are added to each episode's.
 const FEW: f64 = 5.0;
@@ -55,18 +54,20 @@ pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> 
     let rolls = simulator.nominal.rolls();
     let hypothesis = fit.model.hypothesis(&fit.x);
     let mut cells: BTreeMap<(Kind, Phase), Sums> = BTreeMap::new();
+    let groups = groups(chosen.iter().map(|index| &simulator.trials[*index]));
     for (place, index) in chosen.iter().enumerate() {
+        let group = groups.partition_point(|group| group.end <= place);
         let trial = &simulator.trials[*index];
-        let (_, readings) = simulator.readings(&hypothesis, &Engine::default(), Nudge::default(), trial);
+        let (_, readings) = simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial);
         let phases = trial.phases(&readings, rolls);
         let end_secs = trial.time_secs[trial.time_secs.len() - 1] - trial.time_secs[0];
         let residuals: &DVector<f64> = &fit.residuals[place];
         for (block, residual) in trial.blocks.iter().zip(residuals.iter()) {
             let middle = usize::midpoint(block.first, block.end - 1);
             let sums = cells.entry((block.kind, phases[middle])).or_default();
-            sums.episodes.resize(chosen.len(), (0.0, 0));
-            sums.episodes[place].0 += residual * residual;
-            sums.episodes[place].1 += 1;
+            sums.episodes.resize(groups.len(), (0.0, 0));
+            sums.episodes[group].0 += residual * residual;
+            sums.episodes[group].1 += 1;
             sums.square += residual * residual;
             sums.count += 1;
             let share = (trial.time_secs[middle] - trial.time_secs[0]) / end_secs;
@@ -96,7 +97,7 @@ pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> 
     };
     let mut largest: Vec<f64> = (0..FLIPS)
         .map(|_| {
-            let signs: Vec<bool> = (0..chosen.len()).map(|_| StandardUniform.sample(&mut rng)).collect();
+            let signs: Vec<bool> = (0..groups.len()).map(|_| StandardUniform.sample(&mut rng)).collect();
             excess.iter().map(|excess| statistic(excess, Some(&signs))).fold(f64::NEG_INFINITY, f64::max)
         })
         .collect();

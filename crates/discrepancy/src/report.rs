@@ -132,6 +132,11 @@ const NOISE_FLOOR: f64 = 1.0;
 /// A model that closes more of the gap than this explains it, whatever the solver's errors leave.
 const CLOSED: f64 = 0.95;
 
+/// An effect that closes less than this of a gap stands for something else.
+const HALF: f64 = 0.5;
+/// Share of episodes that may go another way than any model.
+const ODD: f64 = 0.25;
+
 impl Report {
     /// What a diagnosis says.
     #[must_use]
@@ -141,11 +146,11 @@ impl Report {
         let (before, after) = (mean(&diagnosis.heldout[0]), mean(&diagnosis.heldout[1]));
         let gap = before - NOISE_FLOOR;
         let closed_fraction = if gap > 0.0 { ((before - after) / gap).min(1.0) } else { 1.0 };
-        let [limit, share] = settings.unexplained;
-        let failing = diagnosis.mean_squares.iter().filter(|mean_square| **mean_square > limit).count();
-        let unexplained = failing as f64 > share * diagnosis.mean_squares.len() as f64 && closed_fraction < CLOSED;
-        let samples = bootstrap(&diagnosis.model, settings.seed);
+        let left = trimmed_mean(diagnosis.mean_squares.clone());
+        let samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
         let effects = effects(diagnosis, &samples);
+        let beside_it = !effects.is_empty() && typical_closing(diagnosis, settings.gap) < HALF;
+        let unexplained = beside_it || (left > settings.unexplained && closed_fraction < CLOSED);
         let verdict = match (unexplained, effects.is_empty()) {
             (true, _) => Verdict::Unknown,
             (false, true) => Verdict::None,
@@ -179,6 +184,22 @@ impl Report {
             seconds,
         }
     }
+}
+
+/// The mean of all but the largest [`ODD`] of them: an odd episode is not explained by the truth either.
+fn trimmed_mean(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.truncate(values.len() - (ODD * values.len() as f64).ceil() as usize);
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Median over the held-out episodes with a mean square above `gap` of the share of it that is closed; 1 where there is none.
+fn typical_closing(diagnosis: &Diagnosis, gap: f64) -> f64 {
+    let closing = |(_, before, after): &(u64, f64, f64)| (before - after) / (before - NOISE_FLOOR);
+    let mut closings: Vec<f64> =
+        diagnosis.heldout_episodes.iter().filter(|(_, before, _)| *before > gap).map(closing).collect();
+    closings.sort_by(f64::total_cmp);
+    closings.get(closings.len() / 2).copied().unwrap_or(1.0)
 }
 
 fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {

@@ -1,14 +1,17 @@
 //! Which effects could explain what the re-tuned nominal model leaves: one linear step for each.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use physics_model::EffectKind;
 
 use crate::candidate::{Candidate, Coordinate};
 use crate::fit::Fit;
-use crate::study::{Stack, Study, chi2, difference, dot};
+use crate::likelihood::{self, Stack, dot, weights};
+use crate::study::{Study, difference};
 
 /// Episodes that the screening looks at, at most.
-const EPISODES: usize = 12;
+const EPISODES: usize = 10;
 /// How far from neutral, in units, the linear step is measured: far enough to stand out of the solver's grain.
 const REACH: f64 = 0.35;
 
@@ -17,8 +20,10 @@ const REACH: f64 = 0.35;
 pub struct Promise {
     /// The candidate.
     pub candidate: Candidate,
-    /// What ln evidence would gain.
+    /// What ln evidence would gain, of all episodes.
     pub gain: f64,
+    /// Number of these.
+    pub episodes: usize,
     /// Coordinates to begin a fit from.
     pub begin: Vec<f64>,
 }
@@ -81,10 +86,10 @@ impl Screening {
     #[must_use]
     pub fn promises(&self, study: &Study, fit: &Fit) -> Vec<Promise> {
         let part = study.part(&self.places);
-        let Fit { x, raw, residuals, jacobian: tuning, .. } = fit.part(&self.places);
+        let Fit { model, x, raw, residuals, jacobian: tuning } = fit.part(&self.places);
         let moved = |change: &Vec<Vec<f64>>| -> Stack {
             let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
-            part.white(&raw.iter().zip(change).map(sum).collect::<Vec<_>>())
+            part.white(&raw.iter().zip(change).map(sum).collect::<Vec<_>>(), model.engine_errors(&x))
         };
         // What was left out says as much again.
         let share = fit.residuals.len() as f64 / self.places.len() as f64;
@@ -93,7 +98,7 @@ impl Screening {
                 let (gain, begin) = match columns {
                     Columns::Whole(change) => {
                         let begin = candidate.begin.clone().unwrap_or_default();
-                        (0.5 * (chi2(&residuals) - chi2(&moved(change))) - begin.len() as f64, begin)
+                        (likelihood::cost(&residuals) - likelihood::cost(&moved(change)) - begin.len() as f64, begin)
                     }
                     Columns::Linear(columns) => {
                         let strengths: Vec<usize> = candidate.strengths().collect();
@@ -109,7 +114,7 @@ impl Screening {
                         (gain, begin)
                     }
                 };
-                Promise { candidate: candidate.clone(), gain: gain * share, begin }
+                Promise { candidate: candidate.clone(), gain: gain * share, episodes: fit.residuals.len(), begin }
             })
             .collect();
         promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -122,29 +127,32 @@ fn reach(coordinate: &Coordinate) -> f64 {
     if coordinate.range[1] >= REACH { REACH } else { -REACH }
 }
 
-/// The best of each kind, as many as asked for.
+/// The best of each kind, as many kinds as asked for; of what has no small version of itself two: a fit does not find the way from afar.
 #[must_use]
 pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
     let mut kinds: Vec<EffectKind> = Vec::new();
     let mut list = Vec::new();
-    for promise in promises {
-        if list.len() == count {
-            break;
-        }
-        if promise.gain > 0.0 && !kinds.contains(&promise.candidate.kind()) {
-            kinds.push(promise.candidate.kind());
+    for promise in promises.iter().filter(|promise| promise.gain > 0.0) {
+        let kind = promise.candidate.kind();
+        let before = kinds.iter().filter(|other| **other == kind).count();
+        let most = if promise.candidate.begin.is_some() { 2 } else { 1 };
+        if before < most && (before > 0 || list.len() < count) {
+            kinds.push(kind);
             list.push(promise.clone());
         }
     }
     list
 }
 
-/// Episodes to look at: evenly over those sorted by how badly the nominal model fails them.
+/// Pieces of the episodes to look at, which are evenly spread over those sorted by how badly the nominal model fails them.
 fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..study.chosen.len()).collect();
-    order.sort_by(|a, b| nominal.residuals[*b].norm_squared().total_cmp(&nominal.residuals[*a].norm_squared()));
+    let groups = study.groups();
+    let failure =
+        |group: &Range<usize>| nominal.residuals[group.clone()].iter().map(DVector::norm_squared).sum::<f64>();
+    let mut order: Vec<usize> = (0..groups.len()).collect();
+    order.sort_by(|a, b| failure(&groups[*b]).total_cmp(&failure(&groups[*a])));
     let count = order.len().min(EPISODES);
-    let mut places: Vec<usize> = (0..count).map(|i| order[i * order.len() / count]).collect();
+    let mut places: Vec<usize> = (0..count).flat_map(|i| groups[order[i * order.len() / count]].clone()).collect();
     places.sort_unstable();
     places
 }
@@ -160,8 +168,19 @@ fn linear(
 ) -> (f64, Vec<f64>) {
     let all: Vec<&Stack> = tuning.iter().chain(columns).collect();
     let (k, n) = (tuning.len(), all.len());
-    let gram = DMatrix::from_fn(n, n, |i, j| dot(all[i], all[j]) + f64::from(u8::from(i == j)));
-    let slope = DVector::from_fn(n, |i, _| dot(all[i], residuals) + z.get(i).copied().unwrap_or(0.0));
+    let weights = weights(residuals);
+    let gram = DMatrix::from_fn(n, n, |i, j| dot(all[i], all[j], &weights) + f64::from(u8::from(i == j)));
+    let x: Vec<f64> = (0..n).map(|i| z.get(i).copied().unwrap_or(0.0)).collect();
+    let slope = DVector::from_fn(n, |i, _| dot(all[i], residuals, &weights) + x[i]);
+    // What it would cost if residuals were linear: their squares do not tell how much an odd episode may say.
+    let cost_at = |delta: &DVector<f64>| {
+        let mut moved = residuals.clone();
+        for (column, d) in all.iter().zip(delta.iter()) {
+            moved.iter_mut().zip(column.iter()).for_each(|(r, c)| r.axpy(*d, c, 1.0));
+        }
+        let prior: f64 = x.iter().zip(delta.iter()).map(|(x, d)| (x + d) * (x + d)).sum();
+        likelihood::cost(&moved) + 0.5 * prior
+    };
     let gain = |kept: &[usize], held: &DVector<f64>| -> Option<(f64, DVector<f64>)> {
         let m = kept.len();
         let a = DMatrix::from_fn(m, m, |i, j| gram[(kept[i], kept[j])]);
@@ -173,11 +192,14 @@ fn linear(
         for (i, value) in kept.iter().zip(cholesky.solve(&b).iter()) {
             delta[*i] = *value;
         }
-        let cost = slope.dot(&delta) + 0.5 * (delta.transpose() * &gram * &delta)[(0, 0)];
-        Some((-cost - cholesky.l().diagonal().iter().map(|d| d.ln()).sum::<f64>(), delta))
+        Some((-cost_at(&delta) - cholesky.l().diagonal().iter().map(|d| d.ln()).sum::<f64>(), delta))
     };
     let nothing = DVector::zeros(n);
-    let without = if k == 0 { 0.0 } else { gain(&(0..k).collect::<Vec<_>>(), &nothing).map_or(0.0, |(gain, _)| gain) };
+    let without = if k == 0 {
+        -cost_at(&nothing)
+    } else {
+        gain(&(0..k).collect::<Vec<_>>(), &nothing).map_or(-cost_at(&nothing), |(gain, _)| gain)
+    };
     let mut held = nothing.clone();
     let mut kept: Vec<usize> = (0..n).collect();
     let mut best = gain(&kept, &held);

@@ -9,7 +9,7 @@ use physics_model::{BodyState, EffectConfig};
 use rayon::prelude::*;
 
 use crate::nominal::{Engine, Nominal};
-use crate::trial::Trial;
+use crate::trial::{Trial, groups};
 
 /// A model of what was measured.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,20 +38,22 @@ pub struct Simulator<'a> {
     pub nominal: &'a Nominal,
     /// The episodes.
     pub trials: &'a [Trial],
-    rollouts: AtomicUsize,
+    ticks: AtomicUsize,
 }
 
 impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, rollouts: AtomicUsize::new(0) }
+        Self { nominal, trials, ticks: AtomicUsize::new(0) }
     }
 
-    /// Simulated episodes so far.
+    /// Simulated time so far, in mean durations of an episode.
     #[must_use]
     pub fn rollouts(&self) -> usize {
-        self.rollouts.load(Ordering::Relaxed)
+        let all: usize = self.trials.iter().map(|trial| trial.ticks).sum();
+        let episodes = groups(self.trials.iter()).len();
+        self.ticks.load(Ordering::Relaxed) * episodes / all.max(1)
     }
 
     /// Residuals of the episodes `chosen` (see [`Trial::residuals`]), in parallel; the order is that of `chosen`.
@@ -69,7 +71,7 @@ impl<'a> Simulator<'a> {
         nudge: Nudge,
         trial: &Trial,
     ) -> (RigReading, Vec<RigReading>) {
-        self.rollouts.fetch_add(1, Ordering::Relaxed);
+        self.ticks.fetch_add(trial.ticks, Ordering::Relaxed);
         let rig = self.nominal.rig(&hypothesis.z, engine);
         let object = self.nominal.object(&hypothesis.z, trial.added_mass_kg, engine);
         let effects: Vec<Box<dyn Effect>> =

@@ -1,13 +1,14 @@
 //! The episodes that a model is fitted to, with what residuals of a right one would look like.
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 
+use crate::likelihood::Stack;
 use crate::nominal::Engine;
 use crate::simulator::{Hypothesis, Nudge, Simulator};
+use crate::trial::groups;
 use crate::whitener::Whitener;
-
-/// Residuals of some episodes, one vector each.
-pub type Stack = Vec<DVector<f64>>;
 
 /// Episodes with their whiteners.
 #[derive(Debug)]
@@ -19,19 +20,24 @@ pub struct Study<'a> {
     /// Indices of the episodes.
     pub chosen: Vec<usize>,
     whiteners: Vec<Whitener>,
+    /// What an error of the engine of size one does to the residuals of each episode, one for each of the variants.
+    engine_errors: Vec<Vec<Vec<f64>>>,
 }
 
-/// Standard deviation of an error that lasts, in differences of the variants below.
+/// Standard deviation of the start's error, in those of what is known of it, and of an error of the solver, in differences of the variants below.
 const ERROR_SCALE: f64 = 1.5;
+/// How much stiffer contacts may be, and less damped: one standard deviation. What is much softer than the model shall be named.
+const STIFFER: f64 = 1.5;
 
-/// Settings under which a right model's answers should not differ.
-fn variants(engine: &Engine) -> [Engine; 5] {
+/// Settings under which a right model's answers should not differ, with the standard deviation of the error in such differences.
+fn variants(engine: &Engine) -> [(Engine, f64); 6] {
     [
-        Engine { refinement: 2 * engine.refinement, ..*engine },
-        Engine { refinement: 3 * engine.refinement, solver_iterations: 2, ..*engine },
-        Engine { solver_iterations: 2 * engine.solver_iterations, ..*engine },
-        Engine { contact_frequency_hz: 3.0 * engine.contact_frequency_hz, ..*engine },
-        Engine { on_points: !engine.on_points, ..*engine },
+        (Engine { refinement: 2 * engine.refinement, ..*engine }, ERROR_SCALE),
+        (Engine { refinement: 3 * engine.refinement, solver_iterations: 2, ..*engine }, ERROR_SCALE),
+        (Engine { solver_iterations: 2 * engine.solver_iterations, ..*engine }, ERROR_SCALE),
+        (Engine { contact_frequency_hz: STIFFER * engine.contact_frequency_hz, ..*engine }, 1.0),
+        (Engine { contact_damping_ratio: engine.contact_damping_ratio / STIFFER, ..*engine }, 1.0),
+        (Engine { on_points: !engine.on_points, ..*engine }, ERROR_SCALE),
     ]
 }
 
@@ -41,7 +47,7 @@ impl<'a> Study<'a> {
     pub fn new(simulator: &'a Simulator<'a>, engine: Engine, chosen: Vec<usize>) -> Self {
         let plain = |index: &usize| Whitener::new(simulator.trials[*index].blocks.len(), &[]);
         let whiteners = chosen.iter().map(plain).collect();
-        Self { simulator, engine, chosen, whiteners }
+        Self { simulator, engine, chosen, whiteners, engine_errors: Vec::new() }
     }
 
     /// Residuals of all its episodes, standardised but not white.
@@ -50,10 +56,25 @@ impl<'a> Study<'a> {
         self.simulator.residuals(hypothesis, &self.engine, Nudge::default(), &self.chosen)
     }
 
-    /// Makes residuals white, and large ones count by their size instead of its square (Huber): half the square of the result is the loss.
+    /// Adds `sizes` of the engine's errors to residuals, makes them white, and large ones count by their size instead of its square (Huber):
+    /// half the square of the result is the loss.
     #[must_use]
-    pub fn white(&self, raw: &[Vec<f64>]) -> Stack {
-        self.whiteners.iter().zip(raw).map(|(whitener, raw)| whitener.apply(raw).map(huber)).collect()
+    pub fn white(&self, raw: &[Vec<f64>], sizes: &[f64]) -> Stack {
+        (self.whiteners.iter().zip(raw).enumerate())
+            .map(|(place, (whitener, raw))| {
+                let mut raw = DVector::from_column_slice(raw);
+                for (error, size) in self.engine_errors.iter().zip(sizes) {
+                    raw.axpy(*size, &DVector::from_column_slice(&error[place]), 1.0);
+                }
+                whitener.apply(raw).map(huber)
+            })
+            .collect()
+    }
+
+    /// Number of the engine's errors.
+    #[must_use]
+    pub fn engine_errors(&self) -> usize {
+        self.engine_errors.len()
     }
 
     /// The episodes at `places` of [`Self::chosen`] alone.
@@ -64,6 +85,9 @@ impl<'a> Study<'a> {
             engine: self.engine,
             chosen: places.iter().map(|place| self.chosen[*place]).collect(),
             whiteners: places.iter().map(|place| self.whiteners[*place].clone()).collect(),
+            engine_errors: (self.engine_errors.iter())
+                .map(|error| places.iter().map(|place| error[*place].clone()).collect())
+                .collect(),
         }
     }
 
@@ -71,28 +95,36 @@ impl<'a> Study<'a> {
     pub fn learn_errors(&mut self, hypothesis: &Hypothesis) {
         let simulate = |engine: &Engine, nudge| self.simulator.residuals(hypothesis, engine, nudge, &self.chosen);
         let plain = simulate(&self.engine, Nudge::default());
-        let mut causes: Vec<Vec<Vec<f64>>> =
-            variants(&self.engine).iter().map(|engine| simulate(engine, Nudge::default())).collect();
+        let change = |engine: &Engine, nudge, scale: f64| -> Vec<Vec<f64>> {
+            let changed = simulate(engine, nudge);
+            let less = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| scale * (a - b)).collect();
+            changed.iter().zip(&plain).map(less).collect()
+        };
+        let engine_errors: Vec<Vec<Vec<f64>>> =
+            (variants(&self.engine).iter()).map(|(engine, scale)| change(engine, Nudge::default(), *scale)).collect();
+        let mut nudges: Vec<Nudge> = Vec::new();
         let unit = |index: usize| std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 });
-        for index in 0..3 {
-            causes.push(simulate(&self.engine, Nudge { pose: unit(index), ..Nudge::default() }));
-        }
+        nudges.extend((0..3).map(|index| Nudge { pose: unit(index), ..Nudge::default() }));
         let moving = |place: usize| self.simulator.trials[self.chosen[place]].start_stddev[2] > 0.0;
         if (0..self.chosen.len()).any(moving) {
-            for index in 0..3 {
-                causes.push(simulate(&self.engine, Nudge { linear: unit(index), ..Nudge::default() }));
-                causes.push(simulate(&self.engine, Nudge { angular: unit(index), ..Nudge::default() }));
-            }
+            nudges.extend((0..3).map(|index| Nudge { linear: unit(index), ..Nudge::default() }));
+            nudges.extend((0..3).map(|index| Nudge { angular: unit(index), ..Nudge::default() }));
         }
-        self.whiteners = (0..self.chosen.len())
-            .map(|place| {
-                let columns: Vec<Vec<f64>> = causes
-                    .iter()
-                    .map(|cause| cause[place].iter().zip(&plain[place]).map(|(a, b)| ERROR_SCALE * (a - b)).collect())
-                    .collect();
-                Whitener::new(plain[place].len(), &columns)
-            })
-            .collect();
+        let start_errors: Vec<Vec<Vec<f64>>> =
+            nudges.into_iter().map(|nudge| change(&self.engine, nudge, ERROR_SCALE)).collect();
+        let columns = |place: usize| -> Vec<&[f64]> {
+            engine_errors.iter().chain(&start_errors).map(|error| error[place].as_slice()).collect()
+        };
+        self.whiteners =
+            (0..self.chosen.len()).map(|place| Whitener::new(plain[place].len(), &columns(place))).collect();
+        // The start is another in each episode; the engine is the same in all, whatever else its errors do to a single one.
+        self.engine_errors = engine_errors;
+    }
+
+    /// Places of the pieces of each episode.
+    #[must_use]
+    pub fn groups(&self) -> Vec<Range<usize>> {
+        groups(self.chosen.iter().map(|index| &self.simulator.trials[*index]))
     }
 
     /// Number of residuals.
@@ -109,18 +141,6 @@ const HUBER: f64 = 4.0;
 fn huber(residual: f64) -> f64 {
     let size = residual.abs();
     if size <= HUBER { residual } else { (HUBER * (2.0 * size - HUBER)).sqrt().copysign(residual) }
-}
-
-/// Sum of squares.
-#[must_use]
-pub fn chi2(stack: &Stack) -> f64 {
-    stack.iter().map(DVector::norm_squared).sum()
-}
-
-/// Sum of products.
-#[must_use]
-pub fn dot(a: &Stack, b: &Stack) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
 /// (a − b) / by.

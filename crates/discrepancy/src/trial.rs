@@ -9,7 +9,10 @@
 mod kind;
 mod phase;
 mod series;
+mod shots;
 mod start;
+
+use std::ops::Range;
 
 use measured_log::{Axis, Channel, Component, Episode, Log};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -39,6 +42,18 @@ fn predicted(reading: &RigReading, channel: Channel) -> f64 {
         Channel::ObjectSpin(a) => reading.object.angular_rps[axis(a)],
         Channel::Command(_) | Channel::ObjectOrientation(_) | Channel::AddedMass => 0.0,
     }
+}
+
+/// Places of the pieces of each episode, which come one after another.
+pub(crate) fn groups<'a>(trials: impl Iterator<Item = &'a Trial>) -> Vec<Range<usize>> {
+    let mut groups: Vec<(u64, Range<usize>)> = Vec::new();
+    for (place, trial) in trials.enumerate() {
+        match groups.last_mut() {
+            Some((id, range)) if *id == trial.id => range.end = place + 1,
+            _ => groups.push((trial.id, place..place + 1)),
+        }
+    }
+    groups.into_iter().map(|(_, range)| range).collect()
 }
 
 /// A block of rows of one component.
@@ -91,9 +106,27 @@ struct Scalar {
 }
 
 impl Trial {
-    /// An episode of a log; `None` where it has no second row or no pose of the object.
+    /// What an episode of a log is compared by: the whole with a tool, pieces of what a free body does. Nothing where it has no second row or no
+    /// pose of the object.
     #[must_use]
-    pub fn new(log: &Log, episode: &Episode, noise: &NoiseLevels, has_tool: bool) -> Option<Self> {
+    pub fn of_episode(log: &Log, episode: &Episode, noise: &NoiseLevels, has_tool: bool) -> Vec<Self> {
+        let pieces = if has_tool { Vec::new() } else { shots::shots(log, episode, noise) };
+        if pieces.is_empty() {
+            let start = start::start(episode, noise);
+            start.and_then(|start| Self::begun(log, episode, noise, has_tool, start)).into_iter().collect()
+        } else {
+            pieces
+        }
+    }
+
+    /// With the given start and its standard deviations.
+    fn begun(
+        log: &Log,
+        episode: &Episode,
+        noise: &NoiseLevels,
+        has_tool: bool,
+        (start, start_stddev): (BodyState, [f64; 4]),
+    ) -> Option<Self> {
         let period_secs = log.header.period_secs;
         let begin_secs = *episode.time_secs.first()?;
         let rows: Vec<(usize, f64)> = (episode.time_secs.iter())
@@ -114,10 +147,7 @@ impl Trial {
         if has_tool && commands.is_none() {
             return None;
         }
-        let tool_m = has_tool.then(|| {
-            let first = |make| (0..episode.rows()).find_map(|row| episode.vector(make, row));
-            first(Channel::Tool).or_else(|| first(Channel::Command))
-        });
+        let tool_m = has_tool.then(|| start::tool(episode, noise));
         let joints = usize::from(log.header.robot.joints());
         let mut scalars = Vec::new();
         for kind in Kind::ALL {
@@ -133,7 +163,6 @@ impl Trial {
             values.iter().any(Option::is_some).then_some((sigma, values))
         });
         let added_mass_kg = episode.get(Channel::AddedMass, 0).unwrap_or(0.0);
-        let (start, start_stddev) = start::start(episode, noise)?;
         let mut trial = Self {
             id: episode.id,
             ticks,
@@ -226,46 +255,46 @@ fn orientation(reading: &RigReading) -> UnitQuaternion<f64> {
     rotation(reading.object.orientation)
 }
 
-impl Trial {
-    /// Where something may have pushed the object out of its way: how far it is off in the end, m, and the place, m, `reach_m` from its centre
-    /// against the direction in which it first left the simulated path.
-    #[must_use]
-    pub fn deflected(&self, readings: &[RigReading], reach_m: f64) -> Option<(f64, [f64; 2])> {
-        let place = |component: usize, row: usize| {
-            let scalar = self.scalars.iter().find(|s| s.kind == Kind::ObjectPosition && s.component == component)?;
-            Some((scalar.values[row]?, scalar.sigma))
-        };
-        let offs = || {
-            self.rows.iter().enumerate().skip(1).filter_map(|(row, (tick, _))| {
-                let simulated = readings.get(tick.checked_sub(1)?)?.object.position_m;
-                let ((x, sigma), (y, _)) = (place(0, row)?, place(1, row)?);
-                Some(([x, y], [x - simulated[0], y - simulated[1]], sigma))
-            })
-        };
-        let (_, [dx, dy], _) = offs().next_back()?;
-        // Clear of noise, and of what friction alone does.
-        let left = offs().find(|(_, [dx, dy], sigma)| dx.hypot(*dy) > 5.0 * sigma + 0.002);
-        left.map(|([x, y], [ax, ay], _)| {
-            let size = ax.hypot(ay);
-            (dx.hypot(dy), [x - reach_m * ax / size, y - reach_m * ay / size])
-        })
-    }
+/// What happened in a row, in the plane of the table.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Happened {
+    /// The object as measured, m.
+    pub(crate) object: [f64; 2],
+    /// The same as simulated.
+    pub(crate) simulated: [f64; 2],
+    /// Its yaw as simulated, rad.
+    pub(crate) yaw_rad: f64,
+    /// The tool as simulated, m.
+    pub(crate) tool: Option<[f64; 2]>,
+    /// Force on the tool as measured, less that as simulated, N; 0 without a sensor.
+    pub(crate) surprise_n: [f64; 2],
+}
 
-    /// The largest force on the tool that the simulation does not know of, N, and the place, m, `ahead_m` ahead of the tool against it.
-    #[must_use]
-    pub fn blocked(&self, readings: &[RigReading], ahead_m: f64) -> Option<(f64, [f64; 2])> {
-        let force = |component: usize, row: usize| {
-            let scalar = self.scalars.iter().find(|s| s.kind == Kind::WristForce && s.component == component)?;
-            scalar.values[row]
+impl Trial {
+    /// Rows with a measured place of the object.
+    pub(crate) fn happened(&self, readings: &[RigReading]) -> Vec<Happened> {
+        let values = |kind, component| {
+            let scalar = self.scalars.iter().find(|s| (s.kind, s.component) == (kind, component));
+            scalar.map_or(&[][..], |scalar| &scalar.values[..])
         };
-        let surprises = self.rows.iter().enumerate().skip(1).filter_map(|(row, (tick, _))| {
-            let reading = readings.get(tick.checked_sub(1)?)?;
-            let tool = reading.tool_m?;
-            let (dx, dy) = (force(0, row)? - reading.wrench.force_n[0], force(1, row)? - reading.wrench.force_n[1]);
-            let size = dx.hypot(dy).max(1e-9);
-            Some((size, [tool[0] - ahead_m * dx / size, tool[1] - ahead_m * dy / size]))
-        });
-        surprises.max_by(|a, b| a.0.total_cmp(&b.0))
+        let [object, force] = [Kind::ObjectPosition, Kind::WristForce].map(|kind| [values(kind, 0), values(kind, 1)]);
+        let read = |columns: &[&[Option<f64>]; 2], row: usize| {
+            Some([*columns[0].get(row)?, *columns[1].get(row)?]).and_then(|[x, y]| Some([x?, y?]))
+        };
+        (self.rows.iter().enumerate().skip(1))
+            .filter_map(|(row, (tick, _))| {
+                let reading = readings.get(tick.checked_sub(1)?)?;
+                let [x, y, _] = reading.object.position_m;
+                let [fx, fy, _] = reading.wrench.force_n;
+                Some(Happened {
+                    object: read(&object, row)?,
+                    simulated: [x, y],
+                    yaw_rad: orientation(reading).euler_angles().2,
+                    tool: reading.tool_m.map(|[x, y, _]| [x, y]),
+                    surprise_n: read(&force, row).map_or([0.0; 2], |[x, y]| [x - fx, y - fy]),
+                })
+            })
+            .collect()
     }
 }
 

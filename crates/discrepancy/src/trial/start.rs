@@ -11,6 +11,8 @@ use crate::noise::NoiseLevels;
 const REST_ROWS: usize = 50;
 /// How far, in standard deviations of the sensor, a reading at rest may be from the first ones.
 const REST_SIGMAS: f64 = 5.0;
+/// How far, in standard deviations, a resting tool is read from where it was sent.
+const TOOL_SIGMAS: f64 = 4.0;
 /// Rows that a velocity at the start is fitted to where it is not measured.
 const VELOCITY_ROWS: usize = 8;
 
@@ -46,16 +48,31 @@ pub(super) fn commands(episode: &Episode, begin_secs: f64, period_secs: f64, tic
     )
 }
 
+/// Where the tool rests before it first moves: where it is sent, if that is where it is read to be, else the mean of the readings.
+pub(super) fn tool(episode: &Episode, noise: &NoiseLevels) -> Option<[f64; 3]> {
+    let first = |make| (0..episode.rows()).find_map(|row| episode.vector(make, row));
+    let Some(sent) = first(Channel::Command) else { return first(Channel::Tool) };
+    let resting = |row: &usize| episode.vector(Channel::Command, *row).is_none_or(|command| command == sent);
+    let read: Vec<Vector3<f64>> = (0..episode.rows().min(REST_ROWS))
+        .take_while(resting)
+        .filter_map(|row| episode.vector(Channel::Tool, row).map(Vector3::from))
+        .collect();
+    if read.is_empty() {
+        return Some(first(Channel::Tool).unwrap_or(sent));
+    }
+    let n = read.len() as f64;
+    let mean = read.iter().sum::<Vector3<f64>>() / n;
+    let tolerance_m = noise.of(Kind::ToolPosition).unwrap_or(0.0) * TOOL_SIGMAS / n.sqrt();
+    let there = (mean - Vector3::from(sent)).amax() < tolerance_m;
+    Some(if there { sent } else { mean.into() })
+}
+
 /// The object at the start, and the standard deviations of its position, orientation, velocity and angular velocity.
 pub(super) fn start(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState, [f64; 4])> {
-    let first: [f64; 3] = episode.vector(Channel::ObjectPosition, 0)?;
-    let attitude = rotation(episode.orientation(0).unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let here = Vector3::from(episode.vector(Channel::ObjectPosition, 0)?);
+    let attitude = first_attitude(episode);
     let (sigma_m, sigma_rad) = (noise.of(Kind::ObjectPosition)?, noise.of(Kind::ObjectOrientation).unwrap_or(0.0));
-    let state = |position_m: Vector3<f64>, turn: Vector3<f64>, linear_mps, angular_rps| {
-        let q = UnitQuaternion::from_scaled_axis(turn) * attitude;
-        BodyState { position_m: position_m.into(), orientation: [q.i, q.j, q.k, q.w], linear_mps, angular_rps }
-    };
-    let here = Vector3::from(first);
+    let state = |place, turn, linear, angular| state(attitude, place, turn, linear, angular);
     if let (Some(linear), Some(angular)) =
         (episode.vector(Channel::ObjectVelocity, 0), episode.vector(Channel::ObjectSpin, 0))
     {
@@ -67,15 +84,7 @@ pub(super) fn start(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState
         }
     }
     // At rest: the mean of what was read before anything moved.
-    let poses: Vec<(f64, Vector3<f64>, Vector3<f64>)> = (0..episode.rows().min(REST_ROWS))
-        .map_while(|row| {
-            let place = Vector3::from(episode.vector(Channel::ObjectPosition, row)?);
-            let turn = episode
-                .orientation(row)
-                .map_or_else(Vector3::zeros, |q| (rotation(q) * attitude.inverse()).scaled_axis());
-            Some((episode.time_secs[row] - episode.time_secs[0], place, turn))
-        })
-        .collect();
+    let poses = poses(episode, REST_ROWS);
     let resting = poses.iter().take_while(|(_, place, _)| (place - here).amax() < REST_SIGMAS * sigma_m).count();
     if resting > VELOCITY_ROWS / 2 {
         // The later half may already be moving by less than what shows.
@@ -86,26 +95,67 @@ pub(super) fn start(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState
         let start = state(place, turn, [0.0; 3], [0.0; 3]);
         return Some((start, [sigma_m / n.sqrt(), sigma_rad / n.sqrt(), 0.0, 0.0]));
     }
-    // In motion: a parabola through the first poses; its constant and its slope.
-    let rows = &poses[..poses.len().min(VELOCITY_ROWS)];
+    let found = moving(episode, noise).map(|(start, stddev, _)| (start, stddev));
+    Some(found.unwrap_or_else(|| (state(here, Vector3::zeros(), [0.0; 3], [0.0; 3]), [sigma_m, sigma_rad, 0.0, 0.0])))
+}
+
+/// The orientation in the first row.
+fn first_attitude(episode: &Episode) -> UnitQuaternion<f64> {
+    rotation(episode.orientation(0).unwrap_or([0.0, 0.0, 0.0, 1.0]))
+}
+
+fn state(
+    attitude: UnitQuaternion<f64>,
+    place: Vector3<f64>,
+    turn: Vector3<f64>,
+    linear_mps: [f64; 3],
+    angular_rps: [f64; 3],
+) -> BodyState {
+    let q = UnitQuaternion::from_scaled_axis(turn) * attitude;
+    BodyState { position_m: place.into(), orientation: [q.i, q.j, q.k, q.w], linear_mps, angular_rps }
+}
+
+/// Time, place and turn since the first row, of the first rows, as far as all have a place.
+fn poses(episode: &Episode, rows: usize) -> Vec<(f64, Vector3<f64>, Vector3<f64>)> {
+    let back = first_attitude(episode).inverse();
+    (0..episode.rows().min(rows))
+        .map_while(|row| {
+            let place = Vector3::from(episode.vector(Channel::ObjectPosition, row)?);
+            let turn = episode.orientation(row).map_or_else(Vector3::zeros, |q| (rotation(q) * back).scaled_axis());
+            Some((episode.time_secs[row] - episode.time_secs[0], place, turn))
+        })
+        .collect()
+}
+
+/// The same in motion: a parabola through the first poses, its constant and its slope. Last, the mean square of what it leaves, in variances of
+/// the sensor.
+pub(super) fn moving(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState, [f64; 4], f64)> {
+    let (sigma_m, sigma_rad) = (noise.of(Kind::ObjectPosition)?, noise.of(Kind::ObjectOrientation).unwrap_or(0.0));
+    let rows = poses(episode, VELOCITY_ROWS);
     if rows.len() < 4 {
-        return Some((state(here, Vector3::zeros(), [0.0; 3], [0.0; 3]), [sigma_m, sigma_rad, 0.0, 0.0]));
+        return None;
     }
     let design = nalgebra::DMatrix::from_fn(rows.len(), 3, |i, j| rows[i].0.powi(j as i32));
     let inverse = (design.transpose() * &design).try_inverse()?;
     let fit = |pick: &dyn Fn(usize) -> f64| {
         let values = nalgebra::DVector::from_fn(rows.len(), |i, _| pick(i));
-        let solution = &inverse * design.transpose() * values;
-        (solution[0], solution[1])
+        let solution = &inverse * design.transpose() * &values;
+        let left = (values - &design * &solution).norm_squared();
+        (solution[0], solution[1], left)
     };
-    let place: [(f64, f64); 3] = std::array::from_fn(|axis| fit(&|i| rows[i].1[axis]));
-    let turn: [(f64, f64); 3] = std::array::from_fn(|axis| fit(&|i| rows[i].2[axis]));
+    let place: [(f64, f64, f64); 3] = std::array::from_fn(|axis| fit(&|i| rows[i].1[axis]));
+    let turn: [(f64, f64, f64); 3] = std::array::from_fn(|axis| fit(&|i| rows[i].2[axis]));
+    let left = place.iter().map(|fit| fit.2 / sigma_m.powi(2)).sum::<f64>()
+        + turn.iter().filter(|_| sigma_rad > 0.0).map(|fit| fit.2 / sigma_rad.powi(2)).sum::<f64>();
     let (constant, slope) = (inverse[(0, 0)].sqrt(), inverse[(1, 1)].sqrt());
     let start = state(
+        first_attitude(episode),
         Vector3::from(place.map(|fit| fit.0)),
         Vector3::from(turn.map(|fit| fit.0)),
         place.map(|fit| fit.1),
         turn.map(|fit| fit.1),
     );
-    Some((start, [sigma_m * constant, sigma_rad * constant, sigma_m * slope, sigma_rad * slope]))
+    let stddev = [sigma_m * constant, sigma_rad * constant, sigma_m * slope, sigma_rad * slope];
+    let freedoms = (rows.len() - 3) * if sigma_rad > 0.0 { 6 } else { 3 };
+    Some((start, stddev, left / freedoms.max(1) as f64))
 }
