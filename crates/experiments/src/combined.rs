@@ -11,6 +11,7 @@ use crate::{Failure, Row, Table, TablePlan, wilson95};
 
 mod csv;
 mod markdown;
+pub(crate) use markdown::probability;
 
 /// A finished run of a table.
 #[derive(Clone, Debug)]
@@ -120,7 +121,8 @@ pub struct Comparison {
     pub second_only: u32,
     /// Worlds that none solved.
     pub neither: u32,
-    /// Exact McNemar test, two-sided, of the sums over the domains; not corrected for the number of comparisons.
+    /// Exact McNemar test, two-sided; over several domains with one sign for all worlds of a number, which share their draws. Not corrected for the
+    /// number of comparisons.
     pub p: f64,
 }
 
@@ -295,8 +297,8 @@ fn comparisons(plan: &TablePlan, parts: &[Part], arms: &[Arm]) -> Vec<Comparison
             for second in arms[index + 1..].iter().filter(|second| wanted(first, second)) {
                 let cells = domains.iter().map(|domain| cells(parts, domain, first, second));
                 let Some(cells) = cells.reduce(|a, b| Some(a?.plus(b?))).flatten() else { continue };
-                let Cells { both, first_only, second_only, neither } = cells;
                 let (domains, first, second, p) = (name.clone(), first.clone(), second.clone(), cells.p());
+                let Cells { both, first_only, second_only, neither, .. } = cells;
                 comparisons.push(Comparison { domains, first, second, both, first_only, second_only, neither, p });
             }
         }

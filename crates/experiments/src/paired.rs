@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use agent::Method;
 use serde::{Deserialize, Serialize};
-use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::TrialRecord;
 
@@ -28,8 +27,8 @@ pub struct Pair {
 }
 
 impl Pair {
-    fn new(first: Method, second: Method, cells: Cells) -> Self {
-        let Cells { both, first_only, second_only, neither } = cells;
+    fn new(first: Method, second: Method, cells: &Cells) -> Self {
+        let Cells { both, first_only, second_only, neither, .. } = *cells;
         Self { first, second, both, first_only, second_only, neither, p: cells.p() }
     }
 }
@@ -38,12 +37,14 @@ impl Pair {
 pub(crate) type Trials = BTreeMap<(Method, u32), TrialRecord>;
 
 /// Numbers of worlds by which of two solved them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Cells {
     pub(crate) both: u32,
     pub(crate) first_only: u32,
     pub(crate) second_only: u32,
     pub(crate) neither: u32,
+    /// By the number of the world: how many more the second solved. Worlds of one number share their draws in all domains.
+    nets: BTreeMap<u32, i32>,
 }
 
 impl Cells {
@@ -52,19 +53,25 @@ impl Cells {
         let mut cells = Self::default();
         for ((_, trial), one) in first.0.range((first.1, 0)..=(first.1, u32::MAX)) {
             let Some(other) = second.0.get(&(second.1, *trial)) else { continue };
-            match (one.success, other.success) {
-                (true, true) => cells.both += 1,
-                (true, false) => cells.first_only += 1,
-                (false, true) => cells.second_only += 1,
-                (false, false) => cells.neither += 1,
-            }
+            let (count, net) = match (one.success, other.success) {
+                (true, true) => (&mut cells.both, 0),
+                (true, false) => (&mut cells.first_only, -1),
+                (false, true) => (&mut cells.second_only, 1),
+                (false, false) => (&mut cells.neither, 0),
+            };
+            *count += 1;
+            cells.nets.insert(*trial, net);
         }
         cells
     }
 
     /// The worlds of both.
-    pub(crate) fn plus(self, other: Self) -> Self {
+    pub(crate) fn plus(mut self, other: Self) -> Self {
+        for (trial, net) in other.nets {
+            *self.nets.entry(trial).or_default() += net;
+        }
         Self {
+            nets: self.nets,
             both: self.both + other.both,
             first_only: self.first_only + other.first_only,
             second_only: self.second_only + other.second_only,
@@ -72,8 +79,10 @@ impl Cells {
         }
     }
 
-    pub(crate) fn p(self) -> f64 {
-        mcnemar(self.first_only, self.second_only)
+    /// Two-sided p of the hypothesis that both are as good: in each world, whatever number of domains it is played in, the sign of the difference
+    /// is the toss of a coin. Of one domain this is McNemar's exact test.
+    pub(crate) fn p(&self) -> f64 {
+        sign_flip(self.nets.values().copied())
     }
 }
 
@@ -82,16 +91,27 @@ pub(crate) fn pairs(methods: &[Method], trials: &Trials) -> Vec<Pair> {
     let mut pairs = Vec::new();
     for (index, &first) in methods.iter().enumerate() {
         for &second in &methods[index + 1..] {
-            pairs.push(Pair::new(first, second, Cells::of((trials, first), (trials, second))));
+            pairs.push(Pair::new(first, second, &Cells::of((trials, first), (trials, second))));
         }
     }
     pairs
 }
 
-/// Two-sided p-value of `a` against `b` discordant pairs: twice the smaller tail of a fair coin, at most 1.
-fn mcnemar(a: u32, b: u32) -> f64 {
-    let coin = Binomial::new(0.5, u64::from(a + b)).expect("a half is a probability");
-    (2.0 * coin.cdf(u64::from(a.min(b)))).min(1.0)
+/// Probability that the sum of `differences`, each with a random sign, is as far from 0 as it is or farther.
+fn sign_flip(differences: impl Iterator<Item = i32>) -> f64 {
+    let differences: Vec<i32> = differences.filter(|difference| *difference != 0).collect();
+    let found = differences.iter().sum::<i32>().unsigned_abs() as usize;
+    let reach: usize = differences.iter().map(|difference| difference.unsigned_abs() as usize).sum();
+    // Probability of each sum from -reach on.
+    let mut chance = vec![0.0; 2 * reach + 1];
+    chance[reach] = 1.0;
+    for difference in &differences {
+        let step = difference.unsigned_abs() as usize;
+        let one = |sum: Option<usize>| sum.and_then(|sum| chance.get(sum)).copied().unwrap_or(0.0);
+        chance = (0..chance.len()).map(|sum| 0.5 * (one(sum.checked_sub(step)) + one(Some(sum + step)))).collect();
+    }
+    let tails = chance.iter().enumerate().filter(|(sum, _)| sum.abs_diff(reach) >= found);
+    tails.map(|(_, chance)| chance).sum::<f64>().min(1.0)
 }
 
 #[cfg(test)]
@@ -99,7 +119,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_p_value_is_that_of_a_fair_coin() {
+    fn of_one_domain_the_p_value_is_that_of_mcnemar() {
+        let mcnemar = |a: usize, b: usize| sign_flip([vec![1; a], vec![-1; b], vec![0; 7]].concat().into_iter());
         assert_eq!(mcnemar(0, 0), 1.0);
         assert_eq!(mcnemar(3, 3), 1.0);
         // 2 (1 + 10) / 2^10 and 2 / 2^5.
@@ -124,13 +145,22 @@ mod tests {
     }
 
     #[test]
-    fn pooled_worlds_add_up_before_they_are_tested() {
-        let cells = |first_only, second_only| Cells { both: 1, first_only, second_only, neither: 2 };
-        let (d1, d2) = (cells(4, 0), cells(2, 1));
-        // Alone 2 / 2^4 and 2 (1 + 3) / 2^3; together 2 (1 + 7) / 2^7.
+    fn a_world_that_is_played_in_several_domains_counts_once() {
+        let cells = |nets: &[i32]| Cells {
+            first_only: nets.iter().filter(|net| **net < 0).count() as u32,
+            second_only: nets.iter().filter(|net| **net > 0).count() as u32,
+            nets: (0..).zip(nets.iter().copied()).collect(),
+            ..Cells::default()
+        };
+        // Alone 2 / 2^4 and 2 (1 + 3) / 2^3.
+        let (d1, d2) = (cells(&[-1, -1, -1, -1, 0]), cells(&[-1, 0, 0, 1, -1]));
         assert!((d1.p() - 0.125).abs() < 1e-12 && (d2.p() - 1.0).abs() < 1e-12);
         let both = d1.plus(d2);
-        assert_eq!(both, Cells { both: 2, first_only: 6, second_only: 1, neither: 4 });
+        assert_eq!((both.first_only, both.second_only), (6, 1));
+        // Differences of 2, 1, 1, 0, 1 in one direction: 2 / 2^4, where seven worlds would give 2 (1 + 7) / 2^7.
+        assert_eq!(both.nets.values().copied().collect::<Vec<_>>(), [-2, -1, -1, 0, -1]);
         assert!((both.p() - 0.125).abs() < 1e-12);
+        // 2, 1 and -1: |sum| is 2 or more in 6 of 8.
+        assert!((sign_flip([2, 1, -1].into_iter()) - 0.75).abs() < 1e-12);
     }
 }

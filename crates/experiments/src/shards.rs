@@ -43,17 +43,27 @@ pub(crate) enum Log {
     Own(PathBuf, File),
     /// A worker's, begun with its first trial.
     Attempt(PathBuf, Shard),
+    /// One that a write has failed in: what follows half a line would be lost.
+    Closed(PathBuf),
 }
 
 impl Log {
-    /// Appends a line, at once, so that a kill leaves whole lines and at most one broken last one.
+    /// Appends a line, at once, so that a kill leaves whole lines and at most one broken last one. After a write that failed nothing is written any more.
     pub(crate) fn append(&mut self, line: &str) -> Result<(), Error> {
         if let Self::Attempt(folder, shard) = self {
             *self = begin(&folder.join("shards"), shard.index)?;
         }
-        let Self::Own(path, file) = self else { unreachable!("an attempt has begun") };
-        let written = file.write_all(line.as_bytes()).and_then(|()| file.sync_data());
-        written.map_err(|source| Error::File { file: path.clone(), action: "writing", source })
+        let (path, written) = match self {
+            Self::Own(path, file) => (path, file.write_all(line.as_bytes()).and_then(|()| file.sync_data())),
+            Self::Attempt(path, _) | Self::Closed(path) => {
+                (path, Err(std::io::Error::other("an earlier write failed")))
+            }
+        };
+        let file = path.clone();
+        written.map_err(|source| {
+            *self = Self::Closed(file.clone());
+            Error::File { file, action: "writing", source }
+        })
     }
 }
 
@@ -185,6 +195,23 @@ mod tests {
         // Somebody who was thought lost goes on.
         first.append(&line(3)).unwrap();
         add(folder.path(), &mut Trials::new(), true).unwrap();
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn after_a_failed_write_nothing_is_written_any_more() {
+        let path = PathBuf::from("/dev/full");
+        let full = std::fs::OpenOptions::new().append(true).open(&path).unwrap();
+        let mut log = Log::Own(path, full);
+        assert!(log.append("1").is_err());
+        let message = error_chain(&log.append("2").unwrap_err());
+        assert!(message.contains("/dev/full") && message.contains("an earlier write failed"), "{message}");
+    }
+
+    #[cfg(target_os = "linux")]
+    fn error_chain(error: &Error) -> String {
+        let causes = std::iter::successors(Some(error as &dyn std::error::Error), |e| e.source());
+        causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
     }
 
     #[test]

@@ -7,6 +7,7 @@ use agent::{Method, Reason};
 use scenario::Published;
 use serde::{Deserialize, Serialize};
 
+use crate::combined::probability;
 use crate::paired::{Pair, pairs};
 use crate::{Failure, Provenance, TrialRecord, wilson95};
 
@@ -160,7 +161,8 @@ impl Table {
         for pair in &self.pairs {
             let Pair { first, second, both, first_only, second_only, neither, p } = pair;
             let names = format!("{}, {}", first.name(), second.name());
-            let _ = writeln!(text, "| {names} | {both} | {first_only} | {second_only} | {neither} | {p:.3} |");
+            let _ =
+                writeln!(text, "| {names} | {both} | {first_only} | {second_only} | {neither} | {} |", probability(*p));
         }
         text
     }

@@ -104,7 +104,8 @@ impl Combined {
             return;
         }
         *text += "\nThe same worlds: how many only the first method solved, how many only the second, and the two-sided p of McNemar's exact \
-                  test, not corrected for the number of comparisons.\n\n";
+                  test, not corrected for the number of comparisons. Worlds of the same number share their draws in all domains: over several \
+                  of them each number has one sign, and intervals of sums, which take them for independent, are a little narrow.\n\n";
         let (mut columns, mut pairs): (Vec<&str>, Vec<(&Arm, &Arm)>) = (Vec::new(), Vec::new());
         for comparison in &self.comparisons {
             if !columns.contains(&comparison.domains.as_str()) {
@@ -161,7 +162,7 @@ fn rate(successes: u32, trials: u32, interval95: [f64; 2], published: Option<Pub
 }
 
 /// To two digits; what is smaller than any of interest says so.
-fn probability(p: f64) -> String {
+pub(crate) fn probability(p: f64) -> String {
     if p < 0.001 {
         "< 0.001".into()
     } else if p < 0.1 {
