@@ -4,24 +4,22 @@ use std::ops::Range;
 
 use measured_log::Log;
 use nalgebra::DVector;
-use physics_model::{EffectKind, ObjectShape, ObjectTheta};
-use rayon::prelude::*;
+use physics_model::EffectKind;
 
-use crate::candidate::{Candidate, Context, candidates};
+use crate::accept::{Episodes, convinces};
+use crate::candidate::{Candidate, candidates};
+use crate::context::context;
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::fit::{Begin, Effort, Fit, cost, fit};
-use crate::interval::bootstrap;
-use crate::likelihood::episode_cost;
 use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Nominal, Tunable};
-use crate::obstacle::{self, Outlines, Place};
 use crate::screen::{Promise, Screening, shortlist};
-use crate::simulator::{Nudge, Simulator};
+use crate::simulator::Simulator;
 use crate::study::Study;
-use crate::trial::{Kind, Trial, groups};
+use crate::trial::{Trial, groups};
 
 /// What the search may do.
 #[derive(Clone, Debug)]
@@ -136,27 +134,7 @@ pub struct Diagnosis {
 /// [`Error::Unfit`] for a log without poses of the object, or with too few episodes that can be simulated.
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
     let noise = NoiseLevels::of_log(log);
-    let split = log.split(settings.seed);
-    let mut trials = Vec::new();
-    let mut sides = [Vec::new(), Vec::new()];
-    for (index, episode) in log.episodes.iter().enumerate() {
-        let side = &mut sides[usize::from(split.holdout.contains(&index))];
-        for trial in Trial::of_episode(log, episode, &noise, nominal.has_tool()) {
-            side.push(trials.len());
-            trials.push(trial);
-        }
-    }
-    let [fitted, heldout] = sides;
-    let episodes = |side: &[usize]| groups(side.iter().map(|index| &trials[*index])).len();
-    if episodes(&fitted) < LEAST_FITTED || heldout.is_empty() {
-        let reason = format!(
-            "expected at least {LEAST_FITTED} episodes to fit and one held out, each with two rows and a pose of the object in the first, \
-             found {} and {}",
-            episodes(&fitted),
-            episodes(&heldout)
-        );
-        return Err(Error::Unfit { log: name.into(), reason });
-    }
+    let (trials, [fitted, heldout]) = trials(log, name, nominal, &noise, settings.seed)?;
     let simulator = Simulator::new(nominal, &trials);
     let engine = nominal.engine();
     let mut search = Search {
@@ -177,23 +155,23 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let screening = Screening::new(&search.study, &null, &candidates(&context));
 
     let mut accepted = null.clone();
-    let pieces = search.study.groups();
-    let counts: Vec<usize> = search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect();
+    let episodes = Episodes {
+        fitted: search.study.groups(),
+        heldout: search.kept.groups(),
+        counts: search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect(),
+    };
     let (mut rounds, mut explained) = (Vec::new(), 0.0);
     while accepted.model.parts.len() < settings.effects {
         if simulator.rollouts() > settings.rollouts {
             break;
         }
-        let round = search.round(&screening, &accepted);
+        let mut round = search.round(&screening, &accepted);
         // The errors of a solver grow with what it is asked to explain.
         let least = settings.threshold.max(SECOND_SHARE * explained);
-        let convinces = |best: &&Rival| {
-            best.gain > least
-                && agrees(best, &round, [&pieces, &search.kept.groups()], &counts, least)
-                && lasts(&best.fit, &pieces, settings.seed)
-        };
-        let best = round.rivals.first().filter(convinces);
-        let best = best.map(|best| (best.gain, best.fit.clone()));
+        let best = round.rivals.iter().position(|rival| convinces(rival, &round, &episodes, least, settings.seed));
+        // Those before it do not convince: they are no rivals.
+        round.rivals.drain(..best.unwrap_or(0));
+        let best = best.map(|_| (round.rivals[0].gain, round.rivals[0].fit.clone()));
         rounds.push(round);
         match best {
             Some((gain, fit)) => (explained, accepted) = (explained + gain, fit),
@@ -202,9 +180,9 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     }
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
     // Of each episode, whose pieces come one after another.
-    let heldout_episodes = (search.kept.groups().into_iter())
+    let heldout_episodes = (episodes.heldout.iter())
         .map(|group| {
-            let count = counts[group.clone()].iter().sum::<usize>().max(1) as f64;
+            let count = episodes.counts[group.clone()].iter().sum::<usize>().max(1) as f64;
             let [before, after] = [0, 1].map(|i| heldout[i][group.clone()].iter().sum::<f64>() / count);
             (trials[search.kept.chosen[group.start]].id, before, after)
         })
@@ -215,7 +193,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         residuals.iter().map(DVector::norm_squared).sum::<f64>() / count.max(1) as f64
     };
     let mean_squares =
-        pieces.iter().map(fitted_mean).chain(heldout_episodes.iter().map(|(_, _, after)| *after)).collect();
+        episodes.fitted.iter().map(fitted_mean).chain(heldout_episodes.iter().map(|(_, _, after)| *after)).collect();
     let chosen = &search.study.chosen;
     let located = locate(&simulator, chosen, &null, settings.seed);
     let remaining = if accepted.model.parts.is_empty() {
@@ -236,16 +214,40 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         mean_squares,
         tunables: nominal.tunables.clone(),
         rollouts: simulator.rollouts(),
-        pieces,
+        pieces: episodes.fitted,
     })
 }
 
-/// Share of resamples in which a strength has to have the same sign.
-const SAME_SIGN: f64 = 0.95;
-/// By chance an effect that no held-out episode shows may explain them worse by this much in ln p.
-const HELDOUT_SLACK: f64 = 1.0;
-/// The same as a share of the gain: the place of an obstacle is not known exactly.
-const HELDOUT_SHARE: f64 = 0.02;
+/// What the log is compared by, and which of it is fitted and held out.
+fn trials(
+    log: &Log,
+    name: &str,
+    nominal: &Nominal,
+    noise: &NoiseLevels,
+    seed: u64,
+) -> Result<(Vec<Trial>, [Vec<usize>; 2]), Error> {
+    let split = log.split(seed);
+    let mut trials = Vec::new();
+    let mut sides = [Vec::new(), Vec::new()];
+    for (index, episode) in log.episodes.iter().enumerate() {
+        let side = &mut sides[usize::from(split.holdout.contains(&index))];
+        for trial in Trial::of_episode(log, episode, noise, nominal.has_tool()) {
+            side.push(trials.len());
+            trials.push(trial);
+        }
+    }
+    let episodes = |side: &[usize]| groups(side.iter().map(|index| &trials[*index])).len();
+    let [fitted, heldout] = [episodes(&sides[0]), episodes(&sides[1])];
+    if fitted < LEAST_FITTED || heldout == 0 {
+        let reason = format!(
+            "expected at least {LEAST_FITTED} episodes to fit and one held out, each with two rows and a pose of the object in the first, \
+             found {fitted} and {heldout}"
+        );
+        return Err(Error::Unfit { log: name.into(), reason });
+    }
+    Ok((trials, sides))
+}
+
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.
 const LEAST_FITTED: usize = 4;
 /// What a further effect has to gain, as a share of what those before it did.
@@ -349,42 +351,6 @@ impl Search<'_> {
     }
 }
 
-/// Whether the last effect is there whichever episodes are left out: some strength of it has the same sign in nearly all resamples.
-fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
-    let Some(part) = fit.model.parts.last() else { return false };
-    let first = fit.x.len() - part.coordinates.len();
-    let samples = bootstrap(fit, groups, seed);
-    // A body in the way has no sign.
-    part.begin.is_some()
-        || part.strengths().any(|index| {
-            let above = samples.iter().filter(|x| x[first + index] > 0.0).count();
-            above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
-        })
-}
-
-/// Whether what was held out is explained no worse, and the effect shows in more than one episode, whether fitted or held out: an odd one names
-/// nothing.
-fn agrees(rival: &Rival, round: &Round, study: [&[Range<usize>]; 2], counts: &[usize], least: f64) -> bool {
-    let heldout: Vec<f64> = (round.before.iter().zip(&rival.heldout).zip(counts))
-        .map(|((before, after), count)| episode_cost(*before, *count) - episode_cost(*after, *count))
-        .collect();
-    let cost = |residuals: &DVector<f64>| episode_cost(residuals.norm_squared(), residuals.len());
-    let fitted: Vec<f64> = round
-        .base
-        .residuals
-        .iter()
-        .zip(&rival.fit.residuals)
-        .map(|(before, after)| cost(before) - cost(after))
-        .collect();
-    let of_episodes = |gains: &[f64], pieces: &[Range<usize>]| -> Vec<f64> {
-        pieces.iter().map(|piece| gains[piece.clone()].iter().sum()).collect()
-    };
-    let gains = [of_episodes(&fitted, study[0]), of_episodes(&heldout, study[1])].concat();
-    let most = gains.iter().copied().fold(0.0, f64::max);
-    let slack = HELDOUT_SLACK.max(HELDOUT_SHARE * rival.gain);
-    heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * least
-}
-
 /// The linear step of the screening as far as it helps: large effects are not linear.
 fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
     let at = |share: f64| -> Vec<f64> {
@@ -413,71 +379,3 @@ fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
     let (_, x, raw) = best.unwrap_or_else(|| (0.0, at(0.0), base.raw.clone()));
     Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() }
 }
-
-/// Where the object went and what the log has.
-fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
-    let nominal = simulator.nominal;
-    let engine = nominal.engine();
-    let (world, theta) = nominal.rig(&null.x, &engine).nominal(&nominal.object(&null.x, 0.0, &engine));
-    let has = |kind: Kind| noise.of(kind).is_some();
-    let mut path: Vec<[f64; 2]> = Vec::new();
-    let mut largest_force_n = 0.0_f64;
-    for episode in &log.episodes {
-        for row in 0..episode.rows() {
-            if let Some([x, y, _]) = episode.vector(measured_log::Channel::ObjectPosition, row)
-                && path.last().is_none_or(|[a, b]| (x - a).hypot(y - b) > 0.01)
-            {
-                path.push([x, y]);
-            }
-            if let Some(f) = episode.vector(measured_log::Channel::WristForce, row) {
-                largest_force_n = largest_force_n.max(f.iter().map(|v| v * v).sum::<f64>().sqrt());
-            }
-        }
-    }
-    let obstacles_m = obstacles(simulator, null, &theta.object);
-    Context {
-        world,
-        theta,
-        places_m: centres(&path, 6),
-        obstacles_m,
-        largest_force_n,
-        tool: nominal.has_tool(),
-        forces: has(Kind::WristForce) || has(Kind::JointTorque),
-        joints: has(Kind::JointPosition) || (nominal.joints() > 0 && has(Kind::ToolPosition)),
-        wrist_torques: has(Kind::WristTorque),
-        joint_torques: has(Kind::JointTorque),
-    }
-}
-
-/// Farthest-point centres of a cloud of points.
-fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
-    let Some(first) = points.first() else { return Vec::new() };
-    let distance = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    let mut centres = vec![*first];
-    while centres.len() < count {
-        let nearest = |p: &[f64; 2]| centres.iter().map(|c| distance(p, c)).fold(f64::INFINITY, f64::min);
-        let farthest = points.iter().max_by(|a, b| nearest(a).total_cmp(&nearest(b)));
-        match farthest {
-            Some(point) if nearest(point) > 0.03 => centres.push(*point),
-            _ => break,
-        }
-    }
-    centres
-}
-
-/// Places at which something may stand in the way.
-fn obstacles(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> Vec<Place> {
-    let hypothesis = null.model.hypothesis(&null.x);
-    let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
-    let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
-    let [x, y, _] = object.size_m;
-    let outlines = Outlines {
-        sides_m: (object.shape == ObjectShape::Box).then_some([0.5 * x, 0.5 * y]),
-        object_m: object.shape.footprint_radius_m(object.size_m),
-        tool_m: simulator.nominal.header().tool_radius_m.unwrap_or(0.0),
-    };
-    obstacle::places(&courses, outlines, OBSTACLES)
-}
-
-/// Places that are tried for an obstacle.
-const OBSTACLES: usize = 5;

@@ -16,7 +16,9 @@
 //!
 //! The same log, seed and version give the same answer, whatever the number of threads.
 
+mod accept;
 pub mod candidate;
+mod context;
 pub mod diagnosis;
 mod error;
 pub mod evidence;

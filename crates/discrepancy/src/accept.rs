@@ -1,0 +1,71 @@
+//! What an effect has to show to be named.
+
+use std::ops::Range;
+
+use nalgebra::DVector;
+
+use crate::diagnosis::{Rival, Round};
+use crate::fit::Fit;
+use crate::interval::bootstrap;
+use crate::likelihood::episode_cost;
+
+/// Share of resamples in which a strength has to have the same sign.
+const SAME_SIGN: f64 = 0.95;
+/// By chance an effect that no held-out episode shows may explain them worse by this much in ln p.
+const HELDOUT_SLACK: f64 = 1.0;
+/// The same as a share of the gain: the place of an obstacle is not known exactly.
+const HELDOUT_SHARE: f64 = 0.02;
+
+/// The episodes of a search.
+pub(crate) struct Episodes {
+    /// Places of the pieces of each fitted one.
+    pub(crate) fitted: Vec<Range<usize>>,
+    /// The same of those held out.
+    pub(crate) heldout: Vec<Range<usize>>,
+    /// Residuals of each held-out piece.
+    pub(crate) counts: Vec<usize>,
+}
+
+/// Whether a rival that is fitted to all episodes gains more than `least` in ln evidence, not by one odd episode, and lasts.
+pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, least: f64, seed: u64) -> bool {
+    rival.fit.residuals.len() == round.base.residuals.len()
+        && rival.gain > least
+        && agrees(rival, round, episodes, least)
+        && lasts(&rival.fit, &episodes.fitted, seed)
+}
+
+/// Whether the last effect is there whichever episodes are left out: some strength of it has the same sign in nearly all resamples.
+fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
+    let Some(part) = fit.model.parts.last() else { return false };
+    let first = fit.x.len() - part.coordinates.len();
+    let samples = bootstrap(fit, groups, seed);
+    // A body in the way has no sign.
+    part.begin.is_some()
+        || part.strengths().any(|index| {
+            let above = samples.iter().filter(|x| x[first + index] > 0.0).count();
+            above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
+        })
+}
+
+/// Whether what was held out is explained no worse, and the effect shows in more than one episode, whether fitted or held out: an odd one names
+/// nothing.
+fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, least: f64) -> bool {
+    let heldout: Vec<f64> = (round.before.iter().zip(&rival.heldout).zip(&episodes.counts))
+        .map(|((before, after), count)| episode_cost(*before, *count) - episode_cost(*after, *count))
+        .collect();
+    let cost = |residuals: &DVector<f64>| episode_cost(residuals.norm_squared(), residuals.len());
+    let fitted: Vec<f64> = round
+        .base
+        .residuals
+        .iter()
+        .zip(&rival.fit.residuals)
+        .map(|(before, after)| cost(before) - cost(after))
+        .collect();
+    let of_episodes = |gains: &[f64], pieces: &[Range<usize>]| -> Vec<f64> {
+        pieces.iter().map(|piece| gains[piece.clone()].iter().sum()).collect()
+    };
+    let gains = [of_episodes(&fitted, &episodes.fitted), of_episodes(&heldout, &episodes.heldout)].concat();
+    let most = gains.iter().copied().fold(0.0, f64::max);
+    let slack = HELDOUT_SLACK.max(HELDOUT_SHARE * rival.gain);
+    heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * least
+}

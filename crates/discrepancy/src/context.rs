@@ -1,0 +1,85 @@
+//! What is known of a log before any effect is tried.
+
+use measured_log::Log;
+use physics_model::{ObjectShape, ObjectTheta};
+use rayon::prelude::*;
+
+use crate::candidate::Context;
+use crate::fit::Fit;
+use crate::noise::NoiseLevels;
+use crate::obstacle::{self, Outlines, Place};
+use crate::simulator::{Nudge, Simulator};
+use crate::trial::{Kind, Trial};
+
+/// Places that are tried for what is tied to one.
+const PLACES: usize = 6;
+/// How far apart, m, they are at least, and how far the object moves before it is looked at again.
+const APART_M: f64 = 0.03;
+const MOVED_M: f64 = 0.01;
+/// Places that are tried for an obstacle.
+const OBSTACLES: usize = 5;
+
+/// Where the object went and what the log has.
+pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
+    let nominal = simulator.nominal;
+    let engine = nominal.engine();
+    let (world, theta) = nominal.rig(&null.x, &engine).nominal(&nominal.object(&null.x, 0.0, &engine));
+    let has = |kind: Kind| noise.of(kind).is_some();
+    let mut path: Vec<[f64; 2]> = Vec::new();
+    let mut largest_force_n = 0.0_f64;
+    for episode in &log.episodes {
+        for row in 0..episode.rows() {
+            if let Some([x, y, _]) = episode.vector(measured_log::Channel::ObjectPosition, row)
+                && path.last().is_none_or(|[a, b]| (x - a).hypot(y - b) > MOVED_M)
+            {
+                path.push([x, y]);
+            }
+            if let Some(f) = episode.vector(measured_log::Channel::WristForce, row) {
+                largest_force_n = largest_force_n.max(f.iter().map(|v| v * v).sum::<f64>().sqrt());
+            }
+        }
+    }
+    let obstacles_m = obstacles(simulator, null, &theta.object);
+    Context {
+        world,
+        theta,
+        places_m: centres(&path, PLACES),
+        obstacles_m,
+        largest_force_n,
+        tool: nominal.has_tool(),
+        forces: has(Kind::WristForce) || has(Kind::JointTorque),
+        joints: has(Kind::JointPosition) || (nominal.joints() > 0 && has(Kind::ToolPosition)),
+        wrist_torques: has(Kind::WristTorque),
+        joint_torques: has(Kind::JointTorque),
+    }
+}
+
+/// Farthest-point centres of a cloud of points.
+fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
+    let Some(first) = points.first() else { return Vec::new() };
+    let distance = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+    let mut centres = vec![*first];
+    while centres.len() < count {
+        let nearest = |p: &[f64; 2]| centres.iter().map(|c| distance(p, c)).fold(f64::INFINITY, f64::min);
+        let farthest = points.iter().max_by(|a, b| nearest(a).total_cmp(&nearest(b)));
+        match farthest {
+            Some(point) if nearest(point) > APART_M => centres.push(*point),
+            _ => break,
+        }
+    }
+    centres
+}
+
+/// Places at which something may stand in the way.
+fn obstacles(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> Vec<Place> {
+    let hypothesis = null.model.hypothesis(&null.x);
+    let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
+    let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
+    let [x, y, _] = object.size_m;
+    let outlines = Outlines {
+        sides_m: (object.shape == ObjectShape::Box).then_some([0.5 * x, 0.5 * y]),
+        object_m: object.shape.footprint_radius_m(object.size_m),
+        tool_m: simulator.nominal.header().tool_radius_m.unwrap_or(0.0),
+    };
+    obstacle::places(&courses, outlines, OBSTACLES)
+}
