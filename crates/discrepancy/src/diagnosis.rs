@@ -36,7 +36,7 @@ pub struct Settings {
     pub threshold: f64,
     /// Effects at most.
     pub effects: usize,
-    /// No further effect is looked for after this many simulated episodes.
+    /// After this many simulated episodes no further effect is looked for, and of rivals the first alone is fitted to all.
     pub rollouts: usize,
     /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story.
     pub unexplained: f64,
@@ -53,7 +53,7 @@ impl Default for Settings {
             confusion: 20.0_f64.ln(),
             threshold: 20.0,
             effects: 2,
-            rollouts: 4000,
+            rollouts: 3900,
             unexplained: 1.4,
             gap: 1.1,
         }
@@ -303,7 +303,8 @@ impl Search<'_> {
             .map(|(rank, quick)| {
                 // Those far behind need no exact optimum: what they gain in the episodes of the screening they gain in all.
                 let gain = quick.log_evidence();
-                if rank == 0 || lead - gain < NEAR {
+                let affordable = self.study.simulator.rollouts() < self.settings.rollouts;
+                if rank == 0 || (lead - gain < NEAR && affordable) {
                     fully(quick)
                 } else {
                     Rival { heldout: self.heldout(&quick), fit: quick, gain: share * (gain - before) }
