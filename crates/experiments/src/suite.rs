@@ -133,7 +133,7 @@ impl Suite {
                 }
                 parts.extend(part.as_ref().map(|part| shown(part, include)));
             }
-            if parts.is_empty() {
+            if parts.iter().all(|part| part.included) {
                 continue;
             }
             // Those of other tables first: they are what the others are compared with.
