@@ -38,6 +38,8 @@ pub struct Settings {
     pub effects: usize,
     /// After this many simulated episodes no further effect is looked for, and of rivals the first alone is fitted to all.
     pub rollouts: usize,
+    /// After this many fits end where they are.
+    pub most: usize,
     /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story.
     pub unexplained: f64,
     /// The same of a held-out one before anything is named, from which on what is named has to close half of its gap.
@@ -54,6 +56,7 @@ impl Default for Settings {
             threshold: 20.0,
             effects: 2,
             rollouts: 3900,
+            most: 4400,
             unexplained: 1.4,
             gap: 1.1,
         }
@@ -135,7 +138,7 @@ pub struct Diagnosis {
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
     let noise = NoiseLevels::of_log(log);
     let (trials, [fitted, heldout]) = trials(log, name, nominal, &noise, settings.seed)?;
-    let simulator = Simulator::new(nominal, &trials);
+    let simulator = Simulator::new(nominal, &trials).with_budget(settings.most);
     let engine = nominal.engine();
     let mut search = Search {
         study: Study::new(&simulator, engine, fitted),
@@ -315,7 +318,9 @@ impl Search<'_> {
             rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
             // Unless those before do not keep what they promise.
             match rivals.first() {
-                Some(first) if first.fit.residuals.len() < self.study.chosen.len() => {
+                Some(first)
+                    if first.fit.residuals.len() < self.study.chosen.len() && !self.study.simulator.exhausted() =>
+                {
                     let first = rivals.swap_remove(0);
                     rivals.push(fully(first.fit));
                 }

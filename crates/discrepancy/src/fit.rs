@@ -106,6 +106,9 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         Effort::Full => 3,
     };
     for round in 0..rounds {
+        if round > 0 && study.simulator.exhausted() {
+            break;
+        }
         if round > 0 {
             jacobian = derivatives(study, &model, &x, (&raw, &residuals));
         }

@@ -39,13 +39,27 @@ pub struct Simulator<'a> {
     /// The episodes.
     pub trials: &'a [Trial],
     ticks: AtomicUsize,
+    /// Simulated episodes after which fits end where they are.
+    budget: usize,
 }
 
 impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, ticks: AtomicUsize::new(0) }
+        Self { nominal, trials, ticks: AtomicUsize::new(0), budget: usize::MAX }
+    }
+
+    /// With a number of simulated episodes after which fits end where they are.
+    #[must_use]
+    pub fn with_budget(self, budget: usize) -> Self {
+        Self { budget, ..self }
+    }
+
+    /// Whether the budget is used up.
+    #[must_use]
+    pub fn exhausted(&self) -> bool {
+        self.rollouts() >= self.budget
     }
 
     /// Simulated time so far, in mean durations of an episode.
