@@ -37,14 +37,16 @@ pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, least
 /// Whether the last effect is there whichever episodes are left out: some strength of it has the same sign in nearly all resamples.
 fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
     let Some(part) = fit.model.parts.last() else { return false };
+    if part.begin.is_some() {
+        // A body in the way has no sign.
+        return true;
+    }
     let first = fit.x.len() - part.coordinates.len();
     let samples = bootstrap(fit, groups, seed);
-    // A body in the way has no sign.
-    part.begin.is_some()
-        || part.strengths().any(|index| {
-            let above = samples.iter().filter(|x| x[first + index] > 0.0).count();
-            above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
-        })
+    part.strengths().any(|index| {
+        let above = samples.iter().filter(|x| x[first + index] > 0.0).count();
+        above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
+    })
 }
 
 /// Whether what was held out is explained no worse, and the effect shows in more than one episode, whether fitted or held out: an odd one names

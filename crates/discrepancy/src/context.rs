@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::candidate::Context;
 use crate::fit::Fit;
 use crate::noise::NoiseLevels;
-use crate::obstacle::{self, Outlines, Place};
+use crate::obstacle::{self, Outlines, Place, distance};
 use crate::simulator::{Nudge, Simulator};
 use crate::trial::{Kind, Trial};
 
@@ -30,7 +30,7 @@ pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &Nois
     for episode in &log.episodes {
         for row in 0..episode.rows() {
             if let Some([x, y, _]) = episode.vector(measured_log::Channel::ObjectPosition, row)
-                && path.last().is_none_or(|[a, b]| (x - a).hypot(y - b) > MOVED_M)
+                && path.last().is_none_or(|last| distance(*last, [x, y]) > MOVED_M)
             {
                 path.push([x, y]);
             }
@@ -57,10 +57,9 @@ pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &Nois
 /// Farthest-point centres of a cloud of points.
 fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
     let Some(first) = points.first() else { return Vec::new() };
-    let distance = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let mut centres = vec![*first];
     while centres.len() < count {
-        let nearest = |p: &[f64; 2]| centres.iter().map(|c| distance(p, c)).fold(f64::INFINITY, f64::min);
+        let nearest = |p: &[f64; 2]| centres.iter().map(|c| distance(*p, *c)).fold(f64::INFINITY, f64::min);
         let farthest = points.iter().max_by(|a, b| nearest(a).total_cmp(&nearest(b)));
         match farthest {
             Some(point) if nearest(point) > APART_M => centres.push(*point),

@@ -157,30 +157,12 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let context = context(&simulator, &null, log, &noise);
     let screening = Screening::new(&search.study, &null, &candidates(&context));
 
-    let mut accepted = null.clone();
     let episodes = Episodes {
         fitted: search.study.groups(),
         heldout: search.kept.groups(),
         counts: search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect(),
     };
-    let (mut rounds, mut explained) = (Vec::new(), 0.0);
-    while accepted.model.parts.len() < settings.effects {
-        if simulator.rollouts() > settings.rollouts {
-            break;
-        }
-        let mut round = search.round(&screening, &accepted);
-        // The errors of a solver grow with what it is asked to explain.
-        let least = settings.threshold.max(SECOND_SHARE * explained);
-        let best = round.rivals.iter().position(|rival| convinces(rival, &round, &episodes, least, settings.seed));
-        // Those before it do not convince: they are no rivals.
-        round.rivals.drain(..best.unwrap_or(0));
-        let best = best.map(|_| (round.rivals[0].gain, round.rivals[0].fit.clone()));
-        rounds.push(round);
-        match best {
-            Some((gain, fit)) => (explained, accepted) = (explained + gain, fit),
-            None => break,
-        }
-    }
+    let (accepted, rounds) = search.effects(&screening, &null, &episodes);
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
     // Of each episode, whose pieces come one after another.
     let heldout_episodes = (episodes.heldout.iter())
@@ -277,6 +259,29 @@ impl Search<'_> {
     fn heldout(&self, fit: &Fit) -> Vec<f64> {
         let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
         self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
+    }
+
+    /// Adds effects to the re-tuned nominal model, as long as one convinces; the model with them, and what was compared.
+    fn effects(&mut self, screening: &Screening, null: &Fit, episodes: &Episodes) -> (Fit, Vec<Round>) {
+        let settings = self.settings;
+        let (mut accepted, mut rounds, mut explained) = (null.clone(), Vec::new(), 0.0);
+        while accepted.model.parts.len() < settings.effects && self.study.simulator.rollouts() <= settings.rollouts {
+            let mut round = self.round(screening, &accepted);
+            // The errors of a solver grow with what it is asked to explain.
+            let least = settings.threshold.max(SECOND_SHARE * explained);
+            let best = round.rivals.iter().position(|rival| convinces(rival, &round, episodes, least, settings.seed));
+            // Those before it do not convince: they are no rivals.
+            round.rivals.drain(..best.unwrap_or(0));
+            if best.is_some() {
+                explained += round.rivals[0].gain;
+                accepted = round.rivals[0].fit.clone();
+            }
+            rounds.push(round);
+            if best.is_none() {
+                break;
+            }
+        }
+        (accepted, rounds)
     }
 
     /// Compares what could be added to `base`.

@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::likelihood::{self, Stack, dot, weights};
+use crate::likelihood::{self, Stack, dot, pick, weights};
 use crate::model::Model;
 use crate::study::{Study, difference};
 
@@ -59,10 +59,6 @@ impl Fit {
         let sides = self.model.one_sided() as f64 * std::f64::consts::LN_2;
         -self.cost() - 0.5 * determinant + sides
     }
-}
-
-fn pick(stack: &Stack, places: &[usize]) -> Stack {
-    places.iter().map(|place| stack[*place].clone()).collect()
 }
 
 /// How long a fit may take.

@@ -10,6 +10,12 @@ use nalgebra::DVector;
 /// White residuals of some episodes, one vector each.
 pub type Stack = Vec<DVector<f64>>;
 
+/// Those at `places`.
+#[must_use]
+pub fn pick(stack: &Stack, places: &[usize]) -> Stack {
+    places.iter().map(|place| stack[*place].clone()).collect()
+}
+
 /// −ln p of all episodes, but for a constant.
 #[must_use]
 pub fn cost(stack: &Stack) -> f64 {

@@ -184,7 +184,8 @@ impl Witness {
     }
 }
 
-fn distance([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
+/// Of two places, m.
+pub(crate) fn distance([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
     (ax - bx).hypot(ay - by)
 }
 

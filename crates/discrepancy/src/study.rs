@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DVector;
 
-use crate::likelihood::Stack;
+use crate::likelihood::{Stack, pick};
 use crate::nominal::Engine;
 use crate::simulator::{Hypothesis, Nudge, Simulator};
 use crate::trial::groups;
@@ -21,7 +21,7 @@ pub struct Study<'a> {
     pub chosen: Vec<usize>,
     whiteners: Vec<Whitener>,
     /// What an error of the engine of size one does to the residuals of each episode, one for each of the variants.
-    engine_errors: Vec<Vec<Vec<f64>>>,
+    engine_errors: Vec<Stack>,
 }
 
 /// Standard deviation of the start's error, in those of what is known of it, and of an error of the solver, in differences of the variants below.
@@ -64,7 +64,7 @@ impl<'a> Study<'a> {
             .map(|(place, (whitener, raw))| {
                 let mut raw = DVector::from_column_slice(raw);
                 for (error, size) in self.engine_errors.iter().zip(sizes) {
-                    raw.axpy(*size, &DVector::from_column_slice(&error[place]), 1.0);
+                    raw.axpy(*size, &error[place], 1.0);
                 }
                 whitener.apply(raw).map(huber)
             })
@@ -85,9 +85,7 @@ impl<'a> Study<'a> {
             engine: self.engine,
             chosen: places.iter().map(|place| self.chosen[*place]).collect(),
             whiteners: places.iter().map(|place| self.whiteners[*place].clone()).collect(),
-            engine_errors: (self.engine_errors.iter())
-                .map(|error| places.iter().map(|place| error[*place].clone()).collect())
-                .collect(),
+            engine_errors: self.engine_errors.iter().map(|error| pick(error, places)).collect(),
         }
     }
 
@@ -95,12 +93,14 @@ impl<'a> Study<'a> {
     pub fn learn_errors(&mut self, hypothesis: &Hypothesis) {
         let simulate = |engine: &Engine, nudge| self.simulator.residuals(hypothesis, engine, nudge, &self.chosen);
         let plain = simulate(&self.engine, Nudge::default());
-        let change = |engine: &Engine, nudge, scale: f64| -> Vec<Vec<f64>> {
+        let change = |engine: &Engine, nudge, scale: f64| -> Stack {
             let changed = simulate(engine, nudge);
-            let less = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| scale * (a - b)).collect();
+            let less = |(a, b): (&Vec<f64>, &Vec<f64>)| {
+                DVector::from_iterator(a.len(), a.iter().zip(b).map(|(a, b)| scale * (a - b)))
+            };
             changed.iter().zip(&plain).map(less).collect()
         };
-        let engine_errors: Vec<Vec<Vec<f64>>> =
+        let engine_errors: Vec<Stack> =
             (variants(&self.engine).iter()).map(|(engine, scale)| change(engine, Nudge::default(), *scale)).collect();
         let mut nudges: Vec<Nudge> = Vec::new();
         let unit = |index: usize| std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 });
@@ -110,7 +110,7 @@ impl<'a> Study<'a> {
             nudges.extend((0..3).map(|index| Nudge { linear: unit(index), ..Nudge::default() }));
             nudges.extend((0..3).map(|index| Nudge { angular: unit(index), ..Nudge::default() }));
         }
-        let start_errors: Vec<Vec<Vec<f64>>> =
+        let start_errors: Vec<Stack> =
             nudges.into_iter().map(|nudge| change(&self.engine, nudge, ERROR_SCALE)).collect();
         let columns = |place: usize| -> Vec<&[f64]> {
             engine_errors.iter().chain(&start_errors).map(|error| error[place].as_slice()).collect()

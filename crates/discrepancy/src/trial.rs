@@ -44,6 +44,27 @@ fn predicted(reading: &RigReading, channel: Channel) -> f64 {
     }
 }
 
+/// A simulated episode. Where it has ended early its last reading stands for the rest.
+struct Course<'a> {
+    start: &'a RigReading,
+    readings: &'a [RigReading],
+}
+
+impl<'a> Course<'a> {
+    fn at(&self, tick: usize) -> &'a RigReading {
+        match tick {
+            0 => self.start,
+            tick => self.readings.get(tick - 1).or(self.readings.last()).unwrap_or(self.start),
+        }
+    }
+
+    /// A channel at a tick and a share of the way to the next.
+    fn value(&self, channel: Channel, (tick, share): (usize, f64)) -> f64 {
+        let value = predicted(self.at(tick), channel);
+        if share > 0.0 { value + share * (predicted(self.at(tick + 1), channel) - value) } else { value }
+    }
+}
+
 /// Places of the pieces of each episode, which come one after another.
 pub(crate) fn groups<'a>(trials: impl Iterator<Item = &'a Trial>) -> Vec<Range<usize>> {
     let mut groups: Vec<(u64, Range<usize>)> = Vec::new();
@@ -205,14 +226,10 @@ impl Trial {
         blocks
     }
 
-    /// Simulated readings against the measured ones: standardised residuals, one a block. Where the simulation has ended early its last
-    /// reading stands for the rest.
+    /// Simulated readings against the measured ones: standardised residuals, one a block.
     #[must_use]
     pub fn residuals(&self, start: &RigReading, readings: &[RigReading]) -> Vec<f64> {
-        let at = |tick: usize| match tick {
-            0 => start,
-            tick => readings.get(tick - 1).or(readings.last()).unwrap_or(start),
-        };
+        let course = Course { start, readings };
         let mut residuals = Vec::with_capacity(self.blocks.len());
         let mut blocks = self.blocks.iter().peekable();
         for scalar in &self.scalars {
@@ -220,12 +237,7 @@ impl Trial {
                 let (mut sum, mut count) = (0.0, 0);
                 for row in block.first..block.end {
                     let Some(measured) = scalar.values[row] else { continue };
-                    let (tick, share) = self.rows[row];
-                    let mut value = predicted(at(tick), scalar.channel);
-                    if share > 0.0 {
-                        value += share * (predicted(at(tick + 1), scalar.channel) - value);
-                    }
-                    sum += measured - value;
+                    sum += measured - course.value(scalar.channel, self.rows[row]);
                     count += 1;
                 }
                 residuals.push(sum / (scalar.sigma * f64::from(count).sqrt()));
@@ -234,9 +246,9 @@ impl Trial {
         if let Some((sigma, values)) = &self.orientation {
             let turns: Vec<Option<Vector3<f64>>> = (values.iter().zip(&self.rows))
                 .map(|(measured, (tick, share))| {
-                    let mut simulated = orientation(at(*tick));
+                    let mut simulated = orientation(course.at(*tick));
                     if *share > 0.0 {
-                        simulated = simulated.nlerp(&orientation(at(tick + 1)), *share);
+                        simulated = simulated.nlerp(&orientation(course.at(tick + 1)), *share);
                     }
                     measured.map(|measured| (measured * simulated.inverse()).scaled_axis())
                 })

@@ -11,7 +11,6 @@ use crate::{Failure, Row, Table, TablePlan, wilson95};
 
 mod csv;
 mod markdown;
-pub(crate) use markdown::probability;
 
 /// A finished run of a table.
 #[derive(Clone, Debug)]

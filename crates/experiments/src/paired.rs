@@ -114,6 +114,17 @@ fn sign_flip(differences: impl Iterator<Item = i32>) -> f64 {
     tails.map(|(_, chance)| chance).sum::<f64>().min(1.0)
 }
 
+/// For people, to two digits; what is smaller than any of interest says so.
+pub(crate) fn probability(p: f64) -> String {
+    if p < 0.001 {
+        "< 0.001".into()
+    } else if p < 0.1 {
+        format!("{p:.3}")
+    } else {
+        format!("{p:.2}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

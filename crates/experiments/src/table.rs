@@ -7,8 +7,7 @@ use agent::{Method, Reason};
 use scenario::Published;
 use serde::{Deserialize, Serialize};
 
-use crate::combined::probability;
-use crate::paired::{Pair, pairs};
+use crate::paired::{Pair, pairs, probability};
 use crate::{Failure, Provenance, TrialRecord, wilson95};
 
 /// A method's row.

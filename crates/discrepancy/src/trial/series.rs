@@ -2,7 +2,7 @@
 
 use physics_model::rig::RigReading;
 
-use super::{Kind, Trial, predicted};
+use super::{Course, Kind, Trial};
 
 /// A component as read and as simulated.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,16 +22,10 @@ impl Trial {
         let Some(scalar) = self.scalars.iter().find(|s| (s.kind, s.component) == (kind, component)) else {
             return Vec::new();
         };
-        let at = |tick: usize| match tick {
-            0 => start,
-            tick => readings.get(tick - 1).or(readings.last()).unwrap_or(start),
-        };
+        let course = Course { start, readings };
         let rows = scalar.values.iter().zip(&self.rows).zip(&self.time_secs);
-        rows.filter_map(|((value, (tick, share)), time)| {
-            let mut simulated = predicted(at(*tick), scalar.channel);
-            if *share > 0.0 {
-                simulated += share * (predicted(at(tick + 1), scalar.channel) - simulated);
-            }
+        rows.filter_map(|((value, row), time)| {
+            let simulated = course.value(scalar.channel, *row);
             Some(Compared { time_secs: time - self.time_secs[0], measured: (*value)?, simulated })
         })
         .collect()

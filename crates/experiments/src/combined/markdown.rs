@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use scenario::Published;
 
 use super::{Arm, Combined};
+use crate::paired::probability;
 
 impl Combined {
     /// Success rates as in the paper, then what ended the trials, then comparisons, then where it all comes from.
@@ -159,15 +160,4 @@ fn rate(successes: u32, trials: u32, interval95: [f64; 2], published: Option<Pub
     let [low, high] = interval95;
     let published = published.map_or(String::new(), |p| format!(" [{}/{}]", p.successes, p.trials));
     format!("{successes}/{trials} ({low:.2}–{high:.2}){published}")
-}
-
-/// To two digits; what is smaller than any of interest says so.
-pub(crate) fn probability(p: f64) -> String {
-    if p < 0.001 {
-        "< 0.001".into()
-    } else if p < 0.1 {
-        format!("{p:.3}")
-    } else {
-        format!("{p:.2}")
-    }
 }
