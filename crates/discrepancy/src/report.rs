@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::evidence::Evidence;
-use crate::interval::{bootstrap, middle_90};
+use crate::interval::{bootstrap, middle_90, widen};
 use crate::locate::Cell;
 use crate::separate;
 
@@ -134,6 +134,8 @@ const CLOSED: f64 = 0.95;
 
 /// An effect that closes less than this of a gap stands for something else.
 const HALF: f64 = 0.5;
+/// In fewer episodes than this a gap may be chance.
+const LEAST_GAPS: usize = 3;
 /// Share of episodes that may go another way than any model.
 const ODD: f64 = 0.25;
 
@@ -147,7 +149,8 @@ impl Report {
         let gap = before - NOISE_FLOOR;
         let closed_fraction = if gap > 0.0 { ((before - after) / gap).min(1.0) } else { 1.0 };
         let left = trimmed_mean(diagnosis.mean_squares.clone());
-        let samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
+        let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
+        widen(&mut samples, &diagnosis.model);
         let effects = effects(diagnosis, &samples);
         let beside_it = !effects.is_empty() && typical_closing(diagnosis, settings.gap) < HALF;
         let unexplained = beside_it || (left > settings.unexplained && closed_fraction < CLOSED);
@@ -193,13 +196,16 @@ fn trimmed_mean(mut values: Vec<f64>) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// Median over the held-out episodes with a mean square above `gap` of the share of it that is closed; 1 where there is none.
+/// Median over the held-out episodes with a mean square above `gap` of the share of it that is closed; 1 where there are too few to say.
 fn typical_closing(diagnosis: &Diagnosis, gap: f64) -> f64 {
     let closing = |(_, before, after): &(u64, f64, f64)| (before - after) / (before - NOISE_FLOOR);
     let mut closings: Vec<f64> =
         diagnosis.heldout_episodes.iter().filter(|(_, before, _)| *before > gap).map(closing).collect();
+    if closings.len() < LEAST_GAPS {
+        return 1.0;
+    }
     closings.sort_by(f64::total_cmp);
-    closings.get(closings.len() / 2).copied().unwrap_or(1.0)
+    closings[closings.len() / 2]
 }
 
 fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {

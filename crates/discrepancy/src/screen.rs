@@ -127,7 +127,7 @@ fn reach(coordinate: &Coordinate) -> f64 {
     if coordinate.range[1] >= REACH { REACH } else { -REACH }
 }
 
-/// The best of each kind, as many kinds as asked for; of what has no small version of itself two: a fit does not find the way from afar.
+/// The best of each kind, as many kinds as asked for; of what is tied to a place two: a fit does not find the way from afar.
 #[must_use]
 pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
     let mut kinds: Vec<EffectKind> = Vec::new();
@@ -135,7 +135,8 @@ pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
     for promise in promises.iter().filter(|promise| promise.gain > 0.0) {
         let kind = promise.candidate.kind();
         let before = kinds.iter().filter(|other| **other == kind).count();
-        let most = if promise.candidate.begin.is_some() { 2 } else { 1 };
+        let placed = promise.candidate.begin.is_some() || kind == EffectKind::FrictionPatch;
+        let most = if placed { 2 } else { 1 };
         if before < most && (before > 0 || list.len() < count) {
             kinds.push(kind);
             list.push(promise.clone());

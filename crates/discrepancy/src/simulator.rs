@@ -5,11 +5,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use physics_model::effect::Effect;
 use physics_model::rig::{RigReading, RigStart};
 use physics_model::world::Wrench;
-use physics_model::{BodyState, EffectConfig};
+use physics_model::{BodyState, EffectConfig, EffectKind};
 use rayon::prelude::*;
 
 use crate::nominal::{Engine, Nominal};
 use crate::trial::{Trial, groups};
+
+/// A bounce is over within a step of a slow push: it needs this many times as many.
+const BOUNCE_REFINEMENT: u32 = 3;
 
 /// A model of what was measured.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,10 +89,12 @@ impl<'a> Simulator<'a> {
         trial: &Trial,
     ) -> (RigReading, Vec<RigReading>) {
         self.ticks.fetch_add(trial.ticks, Ordering::Relaxed);
+        let configs = || self.nominal.effects.iter().chain(&hypothesis.effects);
+        let bounces = configs().any(|effect| effect.kind() == EffectKind::Restitution) && self.nominal.has_tool();
+        let engine = &Engine { refinement: engine.refinement * if bounces { BOUNCE_REFINEMENT } else { 1 }, ..*engine };
         let rig = self.nominal.rig(&hypothesis.z, engine);
         let object = self.nominal.object(&hypothesis.z, trial.added_mass_kg, engine);
-        let effects: Vec<Box<dyn Effect>> =
-            self.nominal.effects.iter().chain(&hypothesis.effects).map(EffectConfig::build).collect();
+        let effects: Vec<Box<dyn Effect>> = configs().map(EffectConfig::build).collect();
         let body = nudged(&trial.start, &trial.start_stddev, nudge);
         let start = RigStart::of_episode(body, trial.tool_m);
         // What went wrong on the way is as far from what was measured as the rest of the episode is.
