@@ -3,6 +3,7 @@
 mod all;
 mod architecture;
 mod bad_input;
+mod closing;
 mod cluster;
 mod pipeline;
 mod world;

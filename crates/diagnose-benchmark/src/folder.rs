@@ -20,8 +20,9 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use whole_file::Existing;
 
-use crate::generate::{GenerateError, generate};
+use crate::generate::generate;
 use crate::plan::{Options, Plan, Truth};
+use crate::recording::RecordError;
 
 /// Draws of a set whose true world goes where no log does, at most.
 const ATTEMPTS: u64 = 20;
@@ -132,7 +133,7 @@ impl Folder {
             let truth: Truth = plan.draw(set, attempt);
             let log = match generate(&truth.spec, arms) {
                 Ok(log) => log,
-                Err(GenerateError::World { .. }) => continue,
+                Err(RecordError::World { .. }) => continue,
                 Err(error) => return Err(error.into()),
             };
             use measured_log::Error as E;

@@ -1,21 +1,16 @@
 //! Logs of a rig with a known world.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use measured_log::{
-    Axis, Channel, Component, Episode, Header, Log, Noise, Number, Object, Readings, Robot, Shape, SplitConfig, Table,
-};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use measured_log::{Header, Log, Noise, Number, Object, Robot, Shape, SplitConfig, Table};
 use physics_model::config::{ObstacleMobility, WorldConfig};
-use physics_model::effect::Effect;
-use physics_model::rig::{Rig, RigError, RigObject, RigReading, RigShape, RigStart, RigTool};
-use physics_model::{BodyState, EffectConfig, ObjectShape};
+use physics_model::rig::{Rig, RigObject, RigShape, RigTool};
+use physics_model::{EffectConfig, ObjectShape};
 use pomdp::{Purpose, Seed};
-use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::actions::{Scene, Script, avoid, designed, passive};
+use crate::recording::{RecordError, Recording};
 use crate::unknown::Unknown;
 
 /// What is done while the log is recorded.
@@ -84,10 +79,6 @@ const PERIOD_SECS: f64 = 0.01;
 const TOOL_FRICTION: f64 = 0.1;
 /// Standard deviation of what a log says of mass and friction, as a share.
 const SHARE: f64 = 0.15;
-/// Force, N, at which an arm stops by itself: the rest of the episode is not recorded.
-const STOP_N: f64 = 40.0;
-/// Rows that an episode keeps at least.
-const LEAST_ROWS: usize = 30;
 
 impl SetSpec {
     /// Sizes of the object, m, as in `ObjectTheta`.
@@ -206,29 +197,12 @@ impl SetSpec {
     }
 }
 
-/// Why a set cannot be.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum GenerateError {
-    /// The arm cannot be read.
-    #[error(transparent)]
-    Tool(#[from] discrepancy::Error),
-    /// The true world goes where no log does.
-    #[error("episode {episode}: {source}")]
-    World {
-        /// Which.
-        episode: usize,
-        /// Why.
-        source: Box<RigError>,
-    },
-}
-
 /// The log of a set. `root`: folder of the project, for arms.
 ///
 /// # Errors
 ///
-/// [`GenerateError`]: a true world that cannot be, to be drawn anew, or an arm that cannot be read.
-pub fn generate(spec: &SetSpec, root: Option<&Path>) -> Result<Log, GenerateError> {
+/// [`RecordError`]: a true world that cannot be, to be drawn anew, or an arm that cannot be read.
+pub fn generate(spec: &SetSpec, root: Option<&Path>) -> Result<Log, RecordError> {
     generate_part(spec, root, usize::MAX)
 }
 
@@ -237,7 +211,7 @@ pub fn generate(spec: &SetSpec, root: Option<&Path>) -> Result<Log, GenerateErro
 /// # Errors
 ///
 /// As [`generate`].
-pub fn generate_part(spec: &SetSpec, root: Option<&Path>, count: usize) -> Result<Log, GenerateError> {
+pub fn generate_part(spec: &SetSpec, root: Option<&Path>, count: usize) -> Result<Log, RecordError> {
     let header = spec.header();
     let (_, table_height_m) = spec.geometry();
     let tool = match (spec.robot, &spec.unknown) {
@@ -264,73 +238,15 @@ pub fn generate_part(spec: &SetSpec, root: Option<&Path>, count: usize) -> Resul
         tick_steps: refinement,
         tool,
     };
-    let shape = RigShape::Solid { shape: spec.shape, size_m: spec.size_m() };
-    let height_m = table_height_m + spec.shape.half_height_m(spec.size_m());
     let [mass, friction] = spec.nominal_errors;
-    let mut episodes = Vec::new();
-    let scripts = spec.scripts();
-    for (index, script) in scripts.iter().enumerate().step_by((scripts.len() / count).max(1)) {
-        let mut object = RigObject::new(shape.clone(), MASS_KG * mass, FRICTION * friction);
-        object.added_mass_kg = script.added_mass_kg;
-        let effects: Vec<Box<dyn Effect>> =
-            spec.effects.iter().map(EffectConfig::build).chain(spec.unknown.iter().map(Unknown::build)).collect();
-        let [x, y] = script.place_m;
-        let body = BodyState::at_rest([x, y, height_m + script.lift_m], script.yaw_rad);
-        let seen = physics_model::effect::signal::read(&effects, &body);
-        let start = RigStart::of_episode(seen, Some(script.commands[0]));
-        let readings = rig
-            .run(&object, &effects, &start, &script.commands[1..])
-            .map_err(|source| GenerateError::World { episode: index, source: Box::new(source) })?;
-        let mut rng = Seed(spec.seed).stream(Purpose::Truth, index as u64);
-        episodes.push(record(index as u64, &header, script, seen, &readings, &mut rng));
-    }
-    Ok(Log { header, episodes })
-}
-
-/// What the sensors say.
-fn record(
-    id: u64,
-    header: &Header,
-    script: &Script,
-    seen: BodyState,
-    readings: &[RigReading],
-    rng: &mut pomdp::Rng,
-) -> Episode {
-    let noise = &header.noise;
-    let mut normal = |stddev: Option<f64>| {
-        let z: f64 = StandardNormal.sample(rng);
-        z * stddev.unwrap_or(0.0)
+    let shape = RigShape::Solid { shape: spec.shape, size_m: spec.size_m() };
+    let recording = Recording {
+        rig,
+        object: RigObject::new(shape, MASS_KG * mass, FRICTION * friction),
+        effects: spec.effects.iter().map(EffectConfig::build).chain(spec.unknown.iter().map(Unknown::build)).collect(),
+        height_m: table_height_m + spec.shape.half_height_m(spec.size_m()),
+        seed: Seed(spec.seed),
     };
-    let stopped = readings.iter().position(|reading| reading.wrench.force_magnitude_n() > STOP_N);
-    let rows = stopped.map_or(script.commands.len(), |tick| (tick + 1).max(LEAST_ROWS).min(script.commands.len()));
-    let mut channels: BTreeMap<Channel, Readings> = BTreeMap::new();
-    let mut push = |channel: Channel, value: Option<f64>| channels.entry(channel).or_default().push(value);
-    for (row, command) in script.commands[..rows].iter().enumerate() {
-        let reading = row.checked_sub(1).map(|row| &readings[row]);
-        let (object, tool) = reading.map_or((seen, *command), |r| (r.object, r.tool_m.unwrap_or(*command)));
-        let turn = Vector3::from_fn(|_, _| normal(noise.object_orientation_rad));
-        let [qx, qy, qz, qw] = object.orientation;
-        let q =
-            UnitQuaternion::from_scaled_axis(turn) * UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
-        for (i, axis) in Axis::ALL.into_iter().enumerate() {
-            push(Channel::Command(axis), Some(command[i]));
-            push(Channel::Tool(axis), Some(tool[i] + normal(noise.tool_position_m)));
-            let wrench = reading.map(|r| (r.wrench.force_n[i], r.wrench.torque_nm[i]));
-            push(Channel::WristForce(axis), wrench.map(|w| w.0 + normal(noise.wrist_force_n)));
-            push(Channel::WristTorque(axis), wrench.map(|w| w.1 + normal(noise.wrist_torque_nm)));
-            push(Channel::ObjectPosition(axis), Some(object.position_m[i] + normal(noise.object_position_m)));
-        }
-        for joint in 0..header.robot.joints() {
-            let place = usize::from(joint);
-            let read = reading.map(|r| (r.joints_rad[place], r.joint_torque_nm[place]));
-            push(Channel::Joint(joint), read.map(|r| r.0 + normal(noise.joint_position_rad)));
-            push(Channel::JointTorque(joint), read.map(|r| r.1 + normal(noise.joint_torque_nm)));
-        }
-        for (component, value) in Component::ALL.into_iter().zip([q.i, q.j, q.k, q.w]) {
-            push(Channel::ObjectOrientation(component), Some(value));
-        }
-        push(Channel::AddedMass, Some(script.added_mass_kg));
-    }
-    let time_secs = (0..rows).map(|row| row as f64 * PERIOD_SECS).collect();
-    Episode { id, time_secs, action: None, channels }
+    let scripts = spec.scripts();
+    recording.log(header, scripts.iter().enumerate().step_by((scripts.len() / count).max(1)))
 }

@@ -10,6 +10,8 @@ pub mod draw;
 pub mod folder;
 pub mod generate;
 pub mod plan;
+pub mod recording;
+pub mod rehearsal;
 pub mod score;
 pub mod table;
 pub mod unknown;

@@ -16,7 +16,7 @@ use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Nominal, Tunable};
-use crate::screen::{Promise, Screening, shortlist};
+use crate::screen::{Promise, Screening, shortlist, translate};
 use crate::simulator::Simulator;
 use crate::study::Study;
 use crate::trial::{Trial, groups};
@@ -356,7 +356,13 @@ impl Search<'_> {
                 fit(&part, model, begin, Effort::Quick)
             })
             .collect();
-        quick.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
+        let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
+        sort(&mut quick);
+        // Twins (a tilt and a force) reach the same optimum or neither: one that was found is where the other begins.
+        if let Some(best) = quick.first().cloned() {
+            quick.iter_mut().skip(1).for_each(|other| follow(&part, &best, other));
+            sort(&mut quick);
+        }
         // Of one kind's several places the best.
         let mut kinds = Vec::new();
         quick.retain(|fit| {
@@ -366,6 +372,42 @@ impl Search<'_> {
             first
         });
         quick
+    }
+}
+
+/// Pairs of effects that do nearly the same: what one does at some strength, the other does at another.
+const TWINS: [[EffectKind; 2]; 6] = [
+    [EffectKind::TableTilt, EffectKind::ConstantForce],
+    [EffectKind::ViscousDamping, EffectKind::QuadraticDrag],
+    [EffectKind::ForceBias, EffectKind::WristPayload],
+    [EffectKind::PoseScale, EffectKind::TimeBase],
+    [EffectKind::PoseDelay, EffectKind::ActuationDelay],
+    [EffectKind::FrictionLevel, EffectKind::ForceGain],
+];
+
+/// Fits `other` anew from where its last effect does what that of `best` does, if that is better than where it is.
+fn follow(part: &Study, best: &Fit, other: &mut Fit) {
+    let (Some(found), Some(candidate)) = (best.model.parts.last(), other.model.parts.last()) else { return };
+    let kinds = [found.kind(), candidate.kind()];
+    if !TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]]) {
+        return;
+    }
+    let (shared, own) = best.x.split_at(best.x.len() - found.coordinates.len());
+    let Some(begin) = translate(part, &shared[..best.model.tunables], (found, own), candidate) else { return };
+    let at = |share: f64| {
+        let own = begin.iter().zip(&candidate.coordinates).map(|(a, c)| (share * a).clamp(c.range[0], c.range[1]));
+        let x: Vec<f64> = shared.iter().copied().chain(own).collect();
+        let raw = part.raw(&other.model.hypothesis(&x));
+        let cost = cost(&x, &part.white(&raw, other.model.engine_errors(&x)));
+        (cost, Begin { x, raw: Some(raw), jacobian: Vec::new() })
+    };
+    let begins = [1.0, 1.5, 2.25].map(at);
+    let Some((cost, begin)) = begins.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+    if cost < other.cost() {
+        let again = fit(part, other.model.clone(), begin, Effort::Quick);
+        if again.log_evidence() > other.log_evidence() {
+            *other = again;
+        }
     }
 }
 

@@ -77,6 +77,12 @@ impl ModelFile {
         }
     }
 
+    /// A model that has these effects, and re-tunes nothing.
+    #[must_use]
+    pub fn of_effects(model: Vec<EffectConfig>) -> Self {
+        Self { version: VERSION, nominal: BTreeMap::new(), effects: Effects { model }, interval: Vec::new() }
+    }
+
     /// Reads a file.
     ///
     /// # Errors

@@ -79,6 +79,9 @@ struct Arguments {
     /// Small budgets: a run of a minute or two whose figures mean nothing.
     #[arg(long)]
     quick: bool,
+    /// A model.toml that `cargo xtask diagnose` wrote: the planner and the belief reckon with its effects (effects.model).
+    #[arg(long, value_name = "FILE", conflicts_with = "all")]
+    model: Option<PathBuf>,
     /// Overrides a scenario entry: key=value.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -233,6 +236,7 @@ fn request(arguments: &Arguments, root: &Path, domain: &str) -> Request {
             preset: arguments.preset.clone(),
             quick: arguments.quick,
             set: arguments.set.clone(),
+            effects: arguments.model.clone(),
         },
         methods: arguments.methods.clone(),
         trials: arguments.trials,

@@ -111,6 +111,7 @@ impl Item<'_> {
             preset: self.run.preset.clone(),
             quick,
             set: self.run.set.iter().chain(set).cloned().collect(),
+            effects: None,
         }
     }
 

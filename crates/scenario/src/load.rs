@@ -1,4 +1,4 @@
-//! Layers of TOML, later values winning: base, robot, preset, domain, quick, `--set`. A resolved scenario is a layer that holds everything: it
+//! Layers of TOML, later values winning: base, robot, preset, domain, quick, effects of a model, `--set`. A resolved scenario is a layer that holds everything: it
 //! replaces all before it.
 
 use std::path::{Path, PathBuf};
@@ -23,6 +23,8 @@ pub struct Selection {
     pub quick: bool,
     /// Overrides `key=value`, with dotted keys and TOML values.
     pub set: Vec<String>,
+    /// A `model.toml` of `diagnose`: its effects become `effects.model`, before the overrides.
+    pub effects: Option<PathBuf>,
 }
 
 impl Selection {
@@ -36,6 +38,7 @@ impl Selection {
             preset: "paper".into(),
             quick: false,
             set: Vec::new(),
+            effects: None,
         }
     }
 
@@ -60,6 +63,9 @@ impl Selection {
                 layers.clear();
             }
             layers.push(Layer { name: path.display().to_string(), table });
+        }
+        if let Some(path) = &self.effects {
+            layers.push(Layer { name: path.display().to_string(), table: read_effects(path)? });
         }
         for text in &self.set {
             layers.push(Layer { name: format!("--set {text}"), table: parse_override(text)? });
@@ -172,6 +178,29 @@ fn read(path: &Path) -> Result<Table, Error> {
     toml::from_str(&text).map_err(|e| syntax(e.to_string()))
 }
 
+/// What a model that `diagnose` wrote says to a scenario: the effects. The rest is about the object of its log.
+fn read_effects(path: &Path) -> Result<Table, Error> {
+    let mut table = read(path)?;
+    let missing = || Error::Key {
+        file: path.display().to_string(),
+        key: "effects.model".into(),
+        message: "expected a list of effects, as `diagnose` writes it".into(),
+    };
+    match table.remove("effects") {
+        Some(Value::Table(mut effects)) => match effects.remove("model") {
+            Some(model @ Value::Array(_)) => Ok(nested(["effects", "model"], model)),
+            _ => Err(missing()),
+        },
+        _ => Err(missing()),
+    }
+}
+
+/// A value below two keys.
+fn nested([outer, inner]: [&str; 2], value: Value) -> Table {
+    let inner = Table::from_iter([(inner.to_string(), value)]);
+    Table::from_iter([(outer.to_string(), Value::Table(inner))])
+}
+
 fn parse_override(text: &str) -> Result<Table, Error> {
     let error = || Error::Override { text: text.into() };
     let (key, value) = text.split_once('=').ok_or_else(error)?;
@@ -269,6 +298,25 @@ mod tests {
         let again = load(|s| s.domain = file.display().to_string());
         std::fs::remove_file(&file).unwrap();
         assert_eq!(again.unwrap(), scenario);
+    }
+
+    #[test]
+    fn a_model_of_diagnose_gives_its_effects_to_the_planner_alone() {
+        let file = std::env::temp_dir().join(format!("surmise-model-{}.toml", std::process::id()));
+        let load_with = |text: &str| {
+            std::fs::write(&file, text).unwrap();
+            let scenario = load(|s| s.effects = Some(file.clone()));
+            std::fs::remove_file(&file).unwrap();
+            scenario
+        };
+        let tilt = "{ table_tilt = { slope_x_rad = 0.01, slope_y_rad = 0.0 } }";
+        let text = format!("version = 1\n[nominal]\n\"table.friction\" = 0.3\n[effects]\nmodel = [{tilt}]\n");
+        let (plain, scenario) = (load(|_| ()).unwrap(), load_with(&text).unwrap());
+        assert_eq!(scenario.effects.model.iter().map(|e| e.kind().name()).collect::<Vec<_>>(), ["table_tilt"]);
+        assert_eq!(scenario.effects.truth, plain.effects.truth);
+        assert_eq!(scenario.distribution, plain.distribution);
+        let missing = load_with("version = 1\n[effects]\n").unwrap_err().to_string();
+        assert!(missing.contains("effects.model"), "{missing}");
     }
 
     #[test]

@@ -31,6 +31,9 @@ enum Verb {
     /// Turns published measurements into a log that can be diagnosed.
     #[command(disable_help_flag = true)]
     ImportLog(Rest),
+    /// Records a log in the true world of a scenario, to rehearse a diagnosis.
+    #[command(disable_help_flag = true)]
+    RecordLog(Rest),
     /// Finds where a log and the simulation disagree and names the missing effect.
     #[command(disable_help_flag = true)]
     Diagnose(Rest),
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
         Verb::Calibrate(rest) => program("calibrate", &rest.arguments),
         Verb::Eval(rest) => program("eval", &rest.arguments),
         Verb::ImportLog(rest) => program("import-log", &rest.arguments),
+        Verb::RecordLog(rest) => program("record-log", &rest.arguments),
         Verb::Diagnose(rest) => program("diagnose", &rest.arguments),
         Verb::DiagnoseBenchmark(rest) => program("diagnose-benchmark", &rest.arguments),
         Verb::Bench(rest) => program("bench", &rest.arguments),

@@ -86,7 +86,10 @@ fn foot(report: &Report) -> String {
             "How much more probable the log is under a model, its free values integrated over; + 3 is 20 to 1.",
         ),
         ("confidence", "Probability of the name among the fitted rivals and the nominal model."),
-        ("90 % interval", "By bootstrap over episodes, widened by what the engine's errors add: nine of ten hold the true value."),
+        (
+            "90 % interval",
+            "By bootstrap over episodes, widened by what the engine's errors add: nine of ten hold the true value.",
+        ),
         ("p value", "Chance that some cell stands out as much by luck, by flips of signs between episodes."),
         ("share", "Part of all that is beyond noise."),
     ];

@@ -1,0 +1,73 @@
+//! `cargo xtask record-log`: a log of the true world of a scenario, to rehearse a diagnosis before a robot is at hand.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result};
+use clap::Parser;
+use diagnose_benchmark::generate::Actions;
+use diagnose_benchmark::rehearsal::record;
+use discrepancy::ModelFile;
+use measured_log::{Episode, Format, Notes};
+use pomdp::Seed;
+use scenario::{Problem, Selection, find_root};
+use whole_file::Existing;
+
+/// Records pushes of one object in the true world of a scenario as a log for diagnose, with the effects that the model knows of as model.toml.
+#[derive(Debug, Parser)]
+#[command(name = "record-log", version)]
+struct Arguments {
+    /// Domain: D1 to D5, obstacle, or a scenario file.
+    #[arg(long, default_value = "D1")]
+    domain: String,
+    /// Arm: sawyer or jaco.
+    #[arg(long, default_value = "sawyer")]
+    robot: String,
+    /// Overrides a scenario entry: key=value; effects.truth=[…] is what diagnose has to find.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Chosen to tell effects apart, or as they come.
+    #[arg(long, value_enum, default_value = "designed")]
+    actions: Actions,
+    /// Seed of the object, the pushes and the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder of the log, without one so far.
+    #[arg(long)]
+    out: PathBuf,
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            let wrote = matches!(error.downcast_ref(), Some(measured_log::Error::Write { .. }));
+            ExitCode::from(if wrote || error.is::<whole_file::Error>() { 1 } else { 2 })
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let root = match &arguments.root {
+        Some(root) => root.clone(),
+        None => find_root(&std::env::current_dir().context("cannot find the current folder")?)?,
+    };
+    let selection = Selection {
+        domain: arguments.domain.clone(),
+        robot: arguments.robot.clone(),
+        set: arguments.set.clone(),
+        ..Selection::new(&root)
+    };
+    let problem = Problem::assemble(&selection.load()?, &root)?;
+    let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
+    measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new())?;
+    let model = ModelFile::of_effects(problem.scenario.effects.model.clone()).to_toml()?;
+    whole_file::write(&arguments.out.join("model.toml"), model.as_bytes(), Existing::Replace)?;
+    let rows: usize = log.episodes.iter().map(Episode::rows).sum();
+    println!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
+    Ok(())
+}
