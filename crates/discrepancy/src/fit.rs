@@ -9,6 +9,8 @@ use crate::study::{Study, difference};
 
 /// Steps between two fresh Jacobians, at most.
 const STEPS: usize = 5;
+/// A fresh Jacobian that gained less than this share of −ln posterior is not followed by another one.
+const LITTLE: f64 = 0.01;
 /// A step that promises less than this in ln posterior is not made.
 const WORTHWHILE: f64 = 0.05;
 
@@ -101,10 +103,13 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         Effort::Quick => 1,
         Effort::Full => 3,
     };
+    let mut before = f64::INFINITY;
     for round in 0..rounds {
-        if round > 0 && study.simulator.exhausted() {
+        let now = cost(&x, &residuals);
+        if round > 0 && (study.simulator.exhausted() || (round > 1 && before - now < LITTLE * now)) {
             break;
         }
+        before = now;
         if round > 0 {
             jacobian = derivatives(study, &model, &x, (&raw, &residuals));
         }
@@ -133,7 +138,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             return Fit { model, x, raw, residuals, jacobian };
         }
     }
-    if effort == Effort::Full {
+    if effort == Effort::Full && study.simulator.affords(x.len() * study.groups().len()) {
         jacobian = derivatives(study, &model, &x, (&raw, &residuals));
     }
     Fit { model, x, raw, residuals, jacobian }

@@ -17,6 +17,7 @@
 //! The same log, seed and version give the same answer, whatever the number of threads.
 
 mod accept;
+mod begin;
 pub mod candidate;
 mod context;
 pub mod diagnosis;

@@ -67,6 +67,16 @@ impl Tunable {
     pub fn value(&self, z: f64) -> f64 {
         if self.positive { self.mean * (z * self.stddev / self.mean).exp() } else { self.mean + z * self.stddev }
     }
+
+    /// The coordinate z of a value.
+    #[must_use]
+    pub fn coordinate(&self, value: f64) -> f64 {
+        if self.positive {
+            (value / self.mean).ln() * self.mean / self.stddev
+        } else {
+            (value - self.mean) / self.stddev
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -152,8 +152,9 @@ impl Report {
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
         widen(&mut samples, &diagnosis.model);
         let effects = effects(diagnosis, &samples);
-        let beside_it = !effects.is_empty() && typical_closing(diagnosis, settings.gap) < HALF;
-        let unexplained = beside_it || (left > settings.unexplained && closed_fraction < CLOSED);
+        let beside_it = !effects.is_empty() && before > settings.gap && typical_closing(diagnosis, settings.gap) < HALF;
+        let odd = effects.is_empty() && diagnosis.heldout_episodes.iter().any(|(_, _, after)| *after > settings.odd);
+        let unexplained = beside_it || odd || (left > settings.unexplained && closed_fraction < CLOSED);
         let verdict = match (unexplained, effects.is_empty()) {
             (true, _) => Verdict::Unknown,
             (false, true) => Verdict::None,

@@ -8,16 +8,12 @@ use physics_model::EffectKind;
 use crate::candidate::{Candidate, Coordinate};
 use crate::fit::Fit;
 use crate::likelihood::{self, Stack, dot, weights};
-use crate::simulator::Hypothesis;
 use crate::study::{Study, difference};
 
 /// Episodes that the screening looks at, at most.
 const EPISODES: usize = 10;
 /// How far from neutral, in units, the linear step is measured: far enough to stand out of the solver's grain.
 const REACH: f64 = 0.35;
-
-/// An effect can do what another does if it leaves less than this of the change's squares.
-const MOST: f64 = 0.5;
 
 /// What a linear step says of a candidate.
 #[derive(Clone, Debug)]
@@ -124,38 +120,6 @@ impl Screening {
         promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
         promises
     }
-}
-
-/// Coordinates at which `other` does roughly what `found` does at its coordinates `a`, beside the nominal model re-tuned to `z`; `None` where it
-/// cannot do most of it. What one unit does is taken to be linear.
-#[must_use]
-pub fn translate(part: &Study, z: &[f64], found: (&Candidate, &[f64]), other: &Candidate) -> Option<Vec<f64>> {
-    let flat = |effects| -> DVector<f64> {
-        let raw = part.raw(&Hypothesis { z: z.to_vec(), effects });
-        DVector::from_iterator(raw.iter().map(Vec::len).sum(), raw.into_iter().flatten())
-    };
-    let base = flat(Vec::new());
-    let change = flat(vec![found.0.effect(found.1)]) - &base;
-    let strengths: Vec<usize> = other.strengths().collect();
-    let slope = |index: &usize| {
-        let [low, high] = other.coordinates[*index].range;
-        let by = if high >= -low { high.min(1.0) } else { low.max(-1.0) };
-        let mut a = vec![0.0; other.coordinates.len()];
-        a[*index] = by;
-        (flat(vec![other.effect(&a)]) - &base) / by
-    };
-    let slopes: Vec<DVector<f64>> = strengths.iter().map(slope).collect();
-    let n = slopes.len();
-    let gram = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&slopes[j]));
-    let solution = gram.cholesky()?.solve(&DVector::from_fn(n, |i, _| slopes[i].dot(&change)));
-    let mut coordinates = vec![0.0; other.coordinates.len()];
-    let mut left = change.clone();
-    for ((index, slope), value) in strengths.iter().zip(&slopes).zip(solution.iter()) {
-        let [low, high] = other.coordinates[*index].range;
-        coordinates[*index] = value.clamp(low, high);
-        left.axpy(-coordinates[*index], slope, 1.0);
-    }
-    (left.norm_squared() < MOST * change.norm_squared()).then_some(coordinates)
 }
 
 /// The change of a strength that is simulated.

@@ -42,27 +42,33 @@ pub struct Simulator<'a> {
     /// The episodes.
     pub trials: &'a [Trial],
     ticks: AtomicUsize,
-    /// Simulated episodes after which fits end where they are.
-    budget: usize,
+    /// Simulated episodes after which fits end where they are, and which are never exceeded by one.
+    budget: [usize; 2],
 }
 
 impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, ticks: AtomicUsize::new(0), budget: usize::MAX }
+        Self { nominal, trials, ticks: AtomicUsize::new(0), budget: [usize::MAX; 2] }
     }
 
-    /// With a number of simulated episodes after which fits end where they are.
+    /// With a number of simulated episodes after which fits end where they are, and one that they never exceed.
     #[must_use]
-    pub fn with_budget(self, budget: usize) -> Self {
+    pub fn with_budget(self, budget: [usize; 2]) -> Self {
         Self { budget, ..self }
     }
 
     /// Whether the budget is used up.
     #[must_use]
     pub fn exhausted(&self) -> bool {
-        self.rollouts() >= self.budget
+        self.rollouts() >= self.budget[0]
+    }
+
+    /// Whether so many more simulated episodes are within the budget.
+    #[must_use]
+    pub fn affords(&self, count: usize) -> bool {
+        self.rollouts() + count <= self.budget[1]
     }
 
     /// Simulated time so far, in mean durations of an episode.

@@ -1,0 +1,132 @@
+//! Where fits begin: a descent finds the nearest optimum, not the best one.
+
+use nalgebra::{DMatrix, DVector};
+use physics_model::EffectKind;
+
+use crate::candidate::Candidate;
+use crate::fit::{Begin, Effort, Fit, cost, fit};
+use crate::model::Model;
+use crate::screen::Promise;
+use crate::simulator::Hypothesis;
+use crate::study::Study;
+
+/// An effect can do what another does if it leaves less than this of the change's squares.
+const MOST: f64 = 0.5;
+
+/// Fits anew from other strengths of the last effect, if one of them is better than where the fit is.
+pub(crate) fn shake(part: &Study, best: &mut Fit) {
+    let Some(candidate) = best.model.parts.last().filter(|part| part.begin.is_none()) else { return };
+    let first = best.x.len() - candidate.coordinates.len();
+    for share in [0.5, 1.5] {
+        let mut x = best.x.clone();
+        for index in candidate.strengths() {
+            let [low, high] = candidate.coordinates[index].range;
+            x[first + index] = (share * x[first + index]).clamp(low, high);
+        }
+        let raw = part.raw(&best.model.hypothesis(&x));
+        if cost(&x, &part.white(&raw, best.model.engine_errors(&x))) < best.cost() {
+            let begin = Begin { x, raw: Some(raw), jacobian: Vec::new() };
+            let again = fit(part, best.model.clone(), begin, Effort::Quick);
+            if again.log_evidence() > best.log_evidence() {
+                *best = again;
+            }
+            return;
+        }
+    }
+}
+
+/// Pairs of effects that do nearly the same: what one does at some strength, the other does at another.
+const TWINS: [[EffectKind; 2]; 6] = [
+    [EffectKind::TableTilt, EffectKind::ConstantForce],
+    [EffectKind::ViscousDamping, EffectKind::QuadraticDrag],
+    [EffectKind::ForceBias, EffectKind::WristPayload],
+    [EffectKind::PoseScale, EffectKind::TimeBase],
+    [EffectKind::PoseDelay, EffectKind::ActuationDelay],
+    [EffectKind::FrictionLevel, EffectKind::ForceGain],
+];
+
+/// Fits `other` anew from where its last effect does what that of `best` does, if that is better than where it is.
+pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
+    let (Some(found), Some(candidate)) = (best.model.parts.last(), other.model.parts.last()) else { return };
+    let kinds = [found.kind(), candidate.kind()];
+    if !TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]]) {
+        return;
+    }
+    let (shared, own) = best.x.split_at(best.x.len() - found.coordinates.len());
+    let Some(begin) = translate(part, &shared[..best.model.tunables], (found, own), candidate) else { return };
+    let at = |share: f64| {
+        let own = begin.iter().zip(&candidate.coordinates).map(|(a, c)| (share * a).clamp(c.range[0], c.range[1]));
+        let x: Vec<f64> = shared.iter().copied().chain(own).collect();
+        let raw = part.raw(&other.model.hypothesis(&x));
+        let cost = cost(&x, &part.white(&raw, other.model.engine_errors(&x)));
+        (cost, Begin { x, raw: Some(raw), jacobian: Vec::new() })
+    };
+    let begins = [1.0, 1.5, 2.25].map(at);
+    let Some((cost, begin)) = begins.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
+    if cost < other.cost() {
+        let again = fit(part, other.model.clone(), begin, Effort::Quick);
+        if again.log_evidence() > other.log_evidence() {
+            *other = again;
+        }
+    }
+}
+
+/// The linear step of the screening as far as it helps: large effects are not linear.
+pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
+    let at = |share: f64| -> Vec<f64> {
+        let own = promise.begin.iter().map(|a| if promise.candidate.begin.is_some() { *a } else { share * a });
+        base.x.iter().copied().chain(own).collect()
+    };
+    let promised = promise.gain * part.chosen.len() as f64 / promise.episodes as f64;
+    let before = base.cost();
+    let mut best: Option<(f64, Vec<f64>, Vec<Vec<f64>>)> = None;
+    // From a border, where a strength may have no more effect, a fit does not find back.
+    let at_border = (promise.begin.iter().zip(&promise.candidate.coordinates))
+        .any(|(a, coordinate)| coordinate.strength && *a != 0.0 && coordinate.range.contains(a));
+    let whole = if at_border { 0.5 } else { 1.0 };
+    for share in [whole, 0.4 * whole, 0.1 * whole] {
+        let x = at(share);
+        let raw = part.raw(&model.hypothesis(&x));
+        let cost = cost(&x, &part.white(&raw, model.engine_errors(&x)));
+        let good = before - cost > 0.5 * promised;
+        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+            best = Some((cost, x, raw));
+        }
+        if promise.candidate.begin.is_some() || (good && share < whole) {
+            break;
+        }
+    }
+    let (_, x, raw) = best.unwrap_or_else(|| (0.0, at(0.0), base.raw.clone()));
+    Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() }
+}
+
+/// Coordinates at which `other` does roughly what `found` does at its coordinates `a`, beside the nominal model re-tuned to `z`; `None` where it
+/// cannot do most of it. What one unit does is taken to be linear.
+fn translate(part: &Study, z: &[f64], found: (&Candidate, &[f64]), other: &Candidate) -> Option<Vec<f64>> {
+    let flat = |effects| -> DVector<f64> {
+        let raw = part.raw(&Hypothesis { z: z.to_vec(), effects });
+        DVector::from_iterator(raw.iter().map(Vec::len).sum(), raw.into_iter().flatten())
+    };
+    let base = flat(Vec::new());
+    let change = flat(vec![found.0.effect(found.1)]) - &base;
+    let strengths: Vec<usize> = other.strengths().collect();
+    let slope = |index: &usize| {
+        let [low, high] = other.coordinates[*index].range;
+        let by = if high >= -low { high.min(1.0) } else { low.max(-1.0) };
+        let mut a = vec![0.0; other.coordinates.len()];
+        a[*index] = by;
+        (flat(vec![other.effect(&a)]) - &base) / by
+    };
+    let slopes: Vec<DVector<f64>> = strengths.iter().map(slope).collect();
+    let n = slopes.len();
+    let gram = DMatrix::from_fn(n, n, |i, j| slopes[i].dot(&slopes[j]));
+    let solution = gram.cholesky()?.solve(&DVector::from_fn(n, |i, _| slopes[i].dot(&change)));
+    let mut coordinates = vec![0.0; other.coordinates.len()];
+    let mut left = change.clone();
+    for ((index, slope), value) in strengths.iter().zip(&slopes).zip(solution.iter()) {
+        let [low, high] = other.coordinates[*index].range;
+        coordinates[*index] = value.clamp(low, high);
+        left.axpy(-coordinates[*index], slope, 1.0);
+    }
+    (left.norm_squared() < MOST * change.norm_squared()).then_some(coordinates)
+}
