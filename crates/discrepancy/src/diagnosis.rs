@@ -250,7 +250,7 @@ fn trials(
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.
 const LEAST_FITTED: usize = 4;
 /// What a further effect has to gain, as a share of what those before it did.
-const SECOND_SHARE: f64 = 0.003;
+const SECOND_SHARE: f64 = 0.02;
 /// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
 const NEAR: f64 = 60.0;
 /// A null that leaves more than this share of the best effect's gain unexplained was no place to learn errors at.
