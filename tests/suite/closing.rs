@@ -2,11 +2,6 @@
 
 use end_to_end::{run, stderr};
 
-/// Balls on a table that falls by 3° towards the goal: the model knows that they resist rolling, and takes the table for level.
-const TRUTH: &str =
-    "effects.truth=[{rolling_resistance={lever_m=0.002}},{table_tilt={slope_x_rad=0.0,slope_y_rad=0.05}}]";
-const BALLS: &str = "distribution.object.shape=[0.0,0.0,1.0]";
-
 fn succeed(binary: &str, arguments: &str) {
     let output = run(binary, arguments);
     assert!(output.status.success(), "{binary} {arguments}: {}", stderr(&output));
@@ -25,8 +20,7 @@ fn what_diagnose_finds_in_a_recorded_log_the_planner_reckons_with() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let (log, found, again, played) = (at("log"), at("found"), at("again"), at("played"));
-    let set = format!("--set {TRUTH} --set {BALLS}");
-    succeed("record-log", &format!("{set} --actions passive --out {}", log.display()));
+    succeed("record-log", &format!("--domain tilted --actions passive --out {}", log.display()));
     let diagnose = |model: &std::path::Path, out: &std::path::Path| {
         let (log, model, out) = (log.display(), model.display(), out.display());
         succeed("diagnose", &format!("--measured {log} --model {model} --out {out}"));
@@ -43,8 +37,8 @@ fn what_diagnose_finds_in_a_recorded_log_the_planner_reckons_with() {
     assert_eq!(report(&again)["verdict"], "none");
 
     let model = found.join("model.toml");
-    let plan = "--domain D1 --preset surmise --quick --methods no-rnn --trials 1";
-    succeed("eval", &format!("{plan} {set} --model {} --out {}", model.display(), played.display()));
+    let plan = "--domain tilted --preset surmise --quick --methods no-rnn --trials 1";
+    succeed("eval", &format!("{plan} --model {} --out {}", model.display(), played.display()));
     let scenario = table(&played.join("scenario.toml"));
     let known = |side: &str| -> Vec<String> {
         let effects = scenario["effects"][side].as_array().unwrap();

@@ -17,7 +17,7 @@ use scenario::Selection;
 #[derive(Debug, Parser)]
 #[command(name = "eval", version)]
 struct Arguments {
-    /// Domain: D1 to D5, obstacle, or a scenario file.
+    /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
     #[arg(long, required_unless_present = "all")]
     domain: Option<String>,
     /// All tables of scenarios/tables, with their pictures.

@@ -267,7 +267,7 @@ mod tests {
 
     #[test]
     fn every_domain_loads_for_every_robot() {
-        for domain in ["D1", "D2", "D3", "D4", "D5", "obstacle", "training"] {
+        for domain in ["D1", "D2", "D3", "D4", "D5", "obstacle", "tilted", "training"] {
             for robot in ["sawyer", "jaco"] {
                 for quick in [false, true] {
                     let scenario = load(|s| {

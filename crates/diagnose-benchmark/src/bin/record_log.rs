@@ -17,8 +17,8 @@ use whole_file::Existing;
 #[derive(Debug, Parser)]
 #[command(name = "record-log", version)]
 struct Arguments {
-    /// Domain: D1 to D5, obstacle, or a scenario file.
-    #[arg(long, default_value = "D1")]
+    /// Domain: tilted, D1 to D5, obstacle, or a scenario file.
+    #[arg(long, default_value = "tilted")]
     domain: String,
     /// Arm: sawyer or jaco.
     #[arg(long, default_value = "sawyer")]
