@@ -1,7 +1,7 @@
 //! Where fits begin: a descent finds the nearest optimum, not the best one.
 
 use nalgebra::{DMatrix, DVector};
-use physics_model::EffectKind;
+use physics_model::{EffectConfig, EffectKind};
 
 use crate::candidate::Candidate;
 use crate::fit::{Begin, Effort, Fit, cost, fit};
@@ -53,7 +53,22 @@ pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
         return;
     }
     let (shared, own) = best.x.split_at(best.x.len() - found.coordinates.len());
-    let Some(begin) = translate(part, &shared[..best.model.tunables], (found, own), candidate) else { return };
+    let z = &shared[..best.model.tunables];
+    let begin = match (found.effect(own), candidate.kind()) {
+        // Exactly: a slope s pulls at a mass m with m g s.
+        (EffectConfig::ConstantForce(force), EffectKind::TableTilt) => {
+            let weight_n = weight_n(part, z);
+            candidate.coordinates_of(&[force.force_x_n / weight_n, force.force_y_n / weight_n])
+        }
+        (EffectConfig::TableTilt(tilt), EffectKind::ConstantForce) => {
+            let weight_n = weight_n(part, z);
+            candidate.coordinates_of(&[tilt.slope_x_rad * weight_n, tilt.slope_y_rad * weight_n])
+        }
+        _ => match translate(part, z, (found, own), candidate) {
+            Some(begin) => begin,
+            None => return,
+        },
+    };
     let at = |share: f64| {
         let own = begin.iter().zip(&candidate.coordinates).map(|(a, c)| (share * a).clamp(c.range[0], c.range[1]));
         let x: Vec<f64> = shared.iter().copied().chain(own).collect();
@@ -69,6 +84,12 @@ pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
             *other = again;
         }
     }
+}
+
+/// Weight of the object, N.
+fn weight_n(part: &Study, z: &[f64]) -> f64 {
+    let nominal = part.simulator.nominal;
+    nominal.object(z, 0.0, &part.engine).mass_kg * nominal.header().gravity_mps2
 }
 
 /// The linear step of the screening as far as it helps: large effects are not linear.

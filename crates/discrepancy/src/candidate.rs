@@ -88,6 +88,17 @@ impl Candidate {
         self.base.with_parameters(&values).unwrap_or_else(|_| self.base.clone())
     }
 
+    /// Coordinates of parameters of the effect, one for each of them, held within their ranges.
+    #[must_use]
+    pub fn coordinates_of(&self, values: &[f64]) -> Vec<f64> {
+        let parameters = self.kind().parameters();
+        let coordinate = |c: &Coordinate| {
+            let a = (parameters[c.index].scale.coordinate(values[c.index]) - c.origin) / c.unit;
+            a.clamp(c.range[0], c.range[1])
+        };
+        self.coordinates.iter().map(coordinate).collect()
+    }
+
     /// Coordinates of the strengths.
     pub fn strengths(&self) -> impl Iterator<Item = usize> + '_ {
         self.coordinates.iter().enumerate().filter(|(_, c)| c.strength).map(|(index, _)| index)
@@ -298,6 +309,8 @@ mod tests {
                 let effect = candidate.effect(&a);
                 assert_ne!(effect, candidate.base);
                 assert!(effect.check().is_ok(), "{effect:?}");
+                let again = candidate.coordinates_of(&effect.values());
+                assert!(again.iter().zip(&a).all(|(x, y)| (x - y).abs() < 1e-9), "{effect:?}: {again:?}");
             }
         }
     }
