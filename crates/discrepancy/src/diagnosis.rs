@@ -6,7 +6,7 @@ use measured_log::Log;
 use nalgebra::DVector;
 use physics_model::{EffectConfig, EffectKind};
 
-use crate::accept::{Episodes, convinces};
+use crate::accept::{Asked, Episodes, convinces};
 use crate::begin::{begin, follow, shake};
 use crate::candidate::{Candidate, candidates};
 use crate::context::context;
@@ -278,8 +278,8 @@ impl Search<'_> {
             // The errors of a solver grow with what it is asked to explain.
             let rolls = self.study.simulator.nominal.rolls();
             let threshold = if rolls { settings.threshold_rolling } else { settings.threshold };
-            let least = threshold.max(SECOND_SHARE * explained);
-            let best = round.rivals.iter().position(|rival| convinces(rival, &round, episodes, least, settings.seed));
+            let asked = Asked { least: threshold.max(SECOND_SHARE * explained), steady: rolls };
+            let best = round.rivals.iter().position(|rival| convinces(rival, &round, episodes, asked, settings.seed));
             // Those before it do not convince: they are no rivals.
             round.rivals.drain(..best.unwrap_or(0));
             accepted = if best.is_some() {
@@ -322,7 +322,11 @@ impl Search<'_> {
         let share = base.residuals.len() as f64 / screening.places.len() as f64;
         let fully = |quick: Fit| {
             let fit = fit(&self.study, quick.model, Begin::at(&quick.x), Effort::Full);
-            Rival { heldout: self.heldout(&fit), gain: fit.log_evidence() - without, fit }
+            Rival {
+                heldout: self.heldout(&fit),
+                gain: fit.log_evidence() - without - self.finer_steps(&base, &fit),
+                fit,
+            }
         };
         let mut rivals: Vec<Rival> = (quick.into_iter().enumerate())
             .map(|(rank, quick)| {
@@ -355,6 +359,17 @@ impl Search<'_> {
             base = again;
         }
         Round { promises, rivals, before: self.heldout(&base), base }
+    }
+
+    /// What a bounce gains by its finer steps alone, which are no bounce: they suit balls.
+    fn finer_steps(&self, base: &Fit, rival: &Fit) -> f64 {
+        let Some(bounce) = rival.model.parts.last().filter(|part| part.kind() == EffectKind::Restitution) else {
+            return 0.0;
+        };
+        let mut hypothesis = base.model.hypothesis(&base.x);
+        hypothesis.effects.push(bounce.effect(&vec![0.0; bounce.coordinates.len()]));
+        let white = self.study.white(&self.study.raw(&hypothesis), base.model.engine_errors(&base.x));
+        (base.cost() - cost(&base.x, &white)).max(0.0)
     }
 
     /// The model without the last effect of `rival` where re-tuning can do the same, fitted from there, if that is better than `base`: no effect may be
