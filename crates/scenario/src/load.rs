@@ -382,7 +382,8 @@ mod tests {
     fn unknown_names_list_what_exists() {
         let message = load(|s| s.domain = "D9".into()).unwrap_err().to_string();
         assert!(
-            message.contains("unknown domain `D9`") && message.contains("d1, d2, d3, d4, d5, obstacle, training"),
+            message.contains("unknown domain `D9`")
+                && message.contains("d1, d2, d3, d4, d5, obstacle, tilted, training"),
             "{message}"
         );
         let message = load(|s| s.robot = "panda".into()).unwrap_err().to_string();
