@@ -22,14 +22,14 @@ impl Columns {
     pub(crate) fn from_rows(schema: &Schema, rows: &[Row]) -> Result<Self, Error> {
         let mut columns = Self::default();
         for (i, row) in rows.iter().enumerate() {
-            let previous = i.checked_sub(1).map(|p| &rows[p]);
-            check(schema, row, previous, rows.get(i + 1)).map_err(|(column, reason)| Error::Row {
-                row: i,
-                episode: row.episode,
-                step: row.step,
-                column,
-                reason,
-            })?;
+            let found = [row.observation.len(), row.state.len(), row.theta.len(), row.classes.len(), row.events.len()];
+            if let Some(((column, names), found)) =
+                schema.lists().into_iter().zip(found).find(|((_, names), found)| names.len() != *found)
+            {
+                let (episode, step, column) = (row.episode, row.step, column.to_owned());
+                let reason = format!("expected {} values, found {found}", names.len());
+                return Err(Error::Row { row: i, episode, step, column, reason });
+            }
             columns.episode.push(row.episode);
             columns.step.push(row.step);
             columns.action.push(row.action);
@@ -41,7 +41,20 @@ impl Columns {
             columns.classes.extend(&row.classes);
             columns.events.extend(&row.events);
         }
+        columns.check(schema)?;
         Ok(columns)
+    }
+
+    /// Checks that the rows form whole episodes of values that the schema allows.
+    pub(crate) fn check(&self, schema: &Schema) -> Result<(), Error> {
+        for i in 0..self.rows() {
+            let row = |i| RowRef::new(self, schema, i);
+            let next = (i + 1 < self.rows()).then(|| row(i + 1));
+            check(schema, &row(i), i.checked_sub(1).map(row).as_ref(), next.as_ref()).map_err(|(column, reason)| {
+                Error::Row { row: i, episode: self.episode[i], step: self.step[i], column, reason }
+            })?;
+        }
+        Ok(())
     }
 
     /// Number of rows.
@@ -63,15 +76,48 @@ impl Columns {
     }
 }
 
-/// Column and reason if `row` does not fit the schema or its neighbours.
-fn check(schema: &Schema, row: &Row, previous: Option<&Row>, next: Option<&Row>) -> Result<(), (String, String)> {
-    let fail = |column: &str, reason: String| Err((column.to_owned(), reason));
-    let lengths = [row.observation.len(), row.state.len(), row.theta.len(), row.classes.len(), row.events.len()];
-    for ((column, names), found) in schema.lists().into_iter().zip(lengths) {
-        if found != names.len() {
-            return fail(column, format!("expected {} values, found {found}", names.len()));
+/// A row of the columns.
+struct RowRef<'a> {
+    episode: u64,
+    step: u32,
+    action: i8,
+    reward: f32,
+    outcome: u8,
+    observation: &'a [f32],
+    state: &'a [f64],
+    theta: &'a [f64],
+    classes: &'a [u8],
+    events: &'a [u8],
+}
+
+impl<'a> RowRef<'a> {
+    fn new(columns: &'a Columns, schema: &Schema, i: usize) -> Self {
+        fn at<'a, T>(values: &'a [T], names: &[String], i: usize) -> &'a [T] {
+            &values[i * names.len()..(i + 1) * names.len()]
+        }
+        Self {
+            episode: columns.episode[i],
+            step: columns.step[i],
+            action: columns.action[i],
+            reward: columns.reward[i],
+            outcome: columns.outcome[i],
+            observation: at(&columns.observation, &schema.observation, i),
+            state: at(&columns.state, &schema.state, i),
+            theta: at(&columns.theta, &schema.theta, i),
+            classes: at(&columns.classes, &schema.classes, i),
+            events: at(&columns.events, &schema.events, i),
         }
     }
+}
+
+/// Column and reason if `row` does not fit the schema or its neighbours.
+fn check(
+    schema: &Schema,
+    row: &RowRef<'_>,
+    previous: Option<&RowRef<'_>>,
+    next: Option<&RowRef<'_>>,
+) -> Result<(), (String, String)> {
+    let fail = |column: &str, reason: String| Err((column.to_owned(), reason));
     let values = (row.observation.iter().map(|v| f64::from(*v)).zip(&schema.observation))
         .chain(row.state.iter().copied().zip(&schema.state))
         .chain(row.theta.iter().copied().zip(&schema.theta));

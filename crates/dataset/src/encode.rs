@@ -1,14 +1,11 @@
-//! Columns to Parquet bytes and back, with a header in the metadata of the Arrow schema.
+//! Columns to Parquet bytes, with a header in the metadata of the Arrow schema.
 
 use std::sync::Arc;
 
-use arrow_array::cast::AsArray;
 use arrow_array::types::{ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, UInt8Type, UInt32Type, UInt64Type};
-use arrow_array::{ArrayRef, FixedSizeListArray, PrimitiveArray, RecordBatch};
-use arrow_schema::{DataType, Field, Metadata};
-use bytes::Bytes;
+use arrow_array::{Array, ArrayRef, FixedSizeListArray, PrimitiveArray, RecordBatch};
+use arrow_schema::{Field, Metadata};
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
@@ -19,7 +16,7 @@ use crate::columns::Columns;
 use crate::{Counts, Provenance, Schema, VERSION, seal};
 
 /// Rows of a row group. Part of the bytes: changing it changes every file.
-const GROUP_ROWS: usize = 64 * 1024;
+pub(crate) const GROUP_ROWS: usize = 64 * 1024;
 
 /// What a shard says about itself.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,7 +53,7 @@ impl Header {
         ])
     }
 
-    fn from_metadata(metadata: &Metadata) -> Result<Self, String> {
+    pub(crate) fn from_metadata(metadata: &Metadata) -> Result<Self, String> {
         let text = |key: &str| metadata.get(key).cloned().ok_or(format!("its metadata lacks the key `{key}`"));
         fn json<T: DeserializeOwned>(key: &str, text: Result<String, String>) -> Result<T, String> {
             serde_json::from_str(&text?).map_err(|e| format!("its metadata key `{key}` is malformed: {e}"))
@@ -125,7 +122,6 @@ pub(crate) fn encode(header: &Header, columns: &Columns) -> Result<Vec<u8>, Parq
             }
         };
     }
-    use arrow_array::Array;
     let schema = &header.schema;
     let (integer, float) = (Encoding::DELTA_BINARY_PACKED, Encoding::BYTE_STREAM_SPLIT);
     scalar!("episode", UInt64Type, columns.episode, integer);
@@ -146,74 +142,14 @@ pub(crate) fn encode(header: &Header, columns: &Columns) -> Result<Vec<u8>, Parq
     Ok(seal::seal(writer.into_inner()?))
 }
 
-/// Header and columns of sealed Parquet bytes; otherwise the reason why not.
-pub(crate) fn decode(bytes: Bytes) -> Result<(Header, Columns), String> {
-    seal::check(&bytes)?;
-    let unreadable = |e: ParquetError| format!("it cannot be decoded: {e}");
-    let builder = ParquetRecordBatchReaderBuilder::try_new(bytes).map_err(unreadable)?;
-    let header = Header::from_metadata(builder.schema().metadata())?;
-    let mut columns = Columns::default();
-    let lists = header.schema.lists().map(|(_, names)| names.len());
-    for batch in builder.with_batch_size(GROUP_ROWS).build().map_err(unreadable)? {
-        let batch = batch.map_err(|e| unreadable(e.into()))?;
-        scalar::<UInt64Type>(&batch, "episode", &mut columns.episode)?;
-        scalar::<UInt32Type>(&batch, "step", &mut columns.step)?;
-        scalar::<Int8Type>(&batch, "action", &mut columns.action)?;
-        scalar::<Float32Type>(&batch, "reward", &mut columns.reward)?;
-        scalar::<UInt8Type>(&batch, "outcome", &mut columns.outcome)?;
-        vector::<Float32Type>(&batch, "observation", lists[0], &mut columns.observation)?;
-        vector::<Float64Type>(&batch, "state", lists[1], &mut columns.state)?;
-        vector::<Float64Type>(&batch, "theta", lists[2], &mut columns.theta)?;
-        vector::<UInt8Type>(&batch, "classes", lists[3], &mut columns.classes)?;
-        vector::<UInt8Type>(&batch, "events", lists[4], &mut columns.events)?;
-    }
-    if columns.rows() as u64 != header.rows {
-        return Err(format!("expected {} rows, found {}", header.rows, columns.rows()));
-    }
-    Ok((header, columns))
-}
-
-fn column<'a>(batch: &'a RecordBatch, name: &str) -> Result<&'a ArrayRef, String> {
-    batch.column_by_name(name).ok_or(format!("it lacks the column `{name}`"))
-}
-
-fn wrong_type(name: &str, expected: &str, found: &DataType) -> String {
-    format!("column `{name}`: expected {expected}, found {found}")
-}
-
-fn scalar<T: ArrowPrimitiveType>(batch: &RecordBatch, name: &str, to: &mut Vec<T::Native>) -> Result<(), String> {
-    let array = column(batch, name)?;
-    let values =
-        array.as_primitive_opt::<T>().ok_or_else(|| wrong_type(name, &T::DATA_TYPE.to_string(), array.data_type()))?;
-    to.extend_from_slice(values.values());
-    Ok(())
-}
-
-fn vector<T: ArrowPrimitiveType>(
-    batch: &RecordBatch,
-    name: &str,
-    width: usize,
-    to: &mut Vec<T::Native>,
-) -> Result<(), String> {
-    if width == 0 {
-        return Ok(());
-    }
-    let array = column(batch, name)?;
-    let values = array
-        .as_fixed_size_list_opt()
-        .filter(|list| usize::try_from(list.value_length()) == Ok(width))
-        .and_then(|list| list.values().as_primitive_opt::<T>())
-        .ok_or_else(|| wrong_type(name, &format!("lists of {width} {}", T::DATA_TYPE), array.data_type()))?;
-    to.extend_from_slice(values.values());
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
+    use bytes::Bytes;
     use parquet::basic::Type;
     use parquet::file::reader::{FileReader, SerializedFileReader};
 
     use super::*;
+    use crate::decode::decode;
 
     #[test]
     fn floats_are_split_by_byte_without_dictionary_and_all_is_compressed() {

@@ -60,6 +60,7 @@
 //! ```
 
 mod columns;
+mod decode;
 mod encode;
 mod error;
 mod manifest;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::publish::{self, Existing};
+use crate::publish::{self, Existing, one_line};
 use crate::shard::{data_files, finished};
 use crate::{Counts, Error, Plan, Schema, ShardInfo, VERSION, shard_path};
 
@@ -78,7 +78,8 @@ impl Manifest {
         for (i, shard) in self.shards.iter().enumerate() {
             let expected = u32::try_from(i).map_or_else(|_| String::new(), shard_path);
             if shard.index as usize != i || shard.path != expected {
-                let reason = format!("expected shard {i} in {expected}, found shard {} in {}", shard.index, shard.path);
+                let found = one_line(&shard.path, 100);
+                let reason = format!("expected shard {i} in {expected}, found shard {} in {found}", shard.index);
                 return Err((format!("shards[{i}]"), reason));
             }
         }

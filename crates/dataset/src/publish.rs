@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-pub(crate) use whole_file::Existing;
+pub(crate) use whole_file::{Existing, one_line};
 
 use crate::{Error, VERSION};
 
@@ -15,12 +15,15 @@ pub(crate) fn publish(path: &Path, bytes: &[u8], existing: Existing) -> Result<b
     whole_file::write(path, bytes, existing).map_err(|e| Error::io(e.action, &e.path)(e.source))
 }
 
+/// Size of a file: a shard is decoded in memory.
+const MOST_BYTES: u64 = 4 << 30;
+
 /// Reads a file; `None` where there is none.
 pub(crate) fn read(path: &Path) -> Result<Option<Vec<u8>>, Error> {
-    match std::fs::read(path) {
+    match whole_file::read(path, MOST_BYTES) {
         Ok(bytes) => Ok(Some(bytes)),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        Err(e) => Err(Error::io("read", path)(e)),
+        Err(e) if e.source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(Error::io(e.action, &e.path)(e.source)),
     }
 }
 
@@ -31,7 +34,7 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T,
     struct Version {
         version: u32,
     }
-    let invalid = |e: serde_json::Error| Error::Json { path: path.to_owned(), reason: e.to_string() };
+    let invalid = |e: serde_json::Error| Error::Json { path: path.to_owned(), reason: one_line(&e.to_string(), 400) };
     let Version { version } = serde_json::from_slice(bytes).map_err(invalid)?;
     if version != VERSION {
         return Err(Error::Version { path: path.to_owned(), found: version });

@@ -1,6 +1,6 @@
 //! The columns of a dataset, where it comes from, and one row of it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -41,8 +41,9 @@ impl Schema {
             return Err(Error::plan("schema.observation", "expected at least one name, found none"));
         }
         for (key, names) in self.lists() {
-            for (i, name) in names.iter().enumerate() {
-                if names[..i].contains(name) {
+            let mut seen = BTreeSet::new();
+            for name in names {
+                if !seen.insert(name) {
                     return Err(Error::plan(format!("schema.{key}"), format!("the name `{name}` appears twice")));
                 }
             }

@@ -5,7 +5,7 @@
 //! and footer are read by nobody: the seal lies there, and the file remains Parquet for every other reader.
 
 const MAGIC: &[u8; 8] = b"surmise1";
-const SEAL_LEN: usize = MAGIC.len() + blake3::OUT_LEN;
+pub(crate) const SEAL_LEN: usize = MAGIC.len() + blake3::OUT_LEN;
 
 /// The Parquet file with its seal.
 ///
@@ -37,7 +37,7 @@ pub(crate) fn check(sealed: &[u8]) -> Result<(), String> {
 }
 
 /// Position of the footer, if the end looks like that of a Parquet file.
-fn footer_start(bytes: &[u8]) -> Option<usize> {
+pub(crate) fn footer_start(bytes: &[u8]) -> Option<usize> {
     let (rest, end) = bytes.split_last_chunk::<4>()?;
     let (rest, length) = rest.split_last_chunk::<4>()?;
     let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;

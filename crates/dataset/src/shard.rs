@@ -6,7 +6,8 @@ use bytes::Bytes;
 use serde::{Deserialize, Serialize};
 
 use crate::columns::Columns;
-use crate::encode::{Header, decode, encode};
+use crate::decode::decode;
+use crate::encode::{Header, encode};
 use crate::publish::{self, Existing};
 use crate::{Counts, Error, Provenance, Row, Schema};
 
@@ -123,7 +124,7 @@ pub fn shard_state(dir: &Path, index: u32, plan_hash: &str) -> Result<ShardState
         Err(reason) => return Ok(ShardState::Broken(reason)),
     };
     if header.provenance.plan_hash != plan_hash {
-        let found = header.provenance.plan_hash;
+        let found = publish::one_line(&header.provenance.plan_hash, 100);
         return Ok(ShardState::Broken(format!("it belongs to another plan: expected {plan_hash}, found {found}")));
     }
     if header.index != index {

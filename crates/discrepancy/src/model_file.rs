@@ -18,6 +18,7 @@ use std::path::Path;
 
 use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
+use whole_file::one_line;
 
 use crate::diagnosis::Diagnosis;
 use crate::error::Error;
@@ -26,6 +27,11 @@ use crate::report::Report;
 
 /// Version of the format.
 const VERSION: u32 = 1;
+
+/// Size of a file.
+const MOST_BYTES: u64 = 4 << 20;
+/// Largest value of the nominal model, in units of its key.
+const LARGEST: f64 = 1e6;
 
 /// Content of the file.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -89,11 +95,27 @@ impl ModelFile {
     ///
     /// [`Error::Model`] with file and key.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let refuse = |reason: String| Error::Model { reason: format!("{}: {reason}", path.display()) };
-        let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
-        let file: Self = toml::from_str(&text).map_err(|error| refuse(error.to_string()))?;
+        let refuse =
+            |reason: String| Error::Model { reason: format!("{}: {}", path.display(), one_line(&reason, 400)) };
+        let bytes = whole_file::read(path, MOST_BYTES).map_err(|error| refuse(error.source.to_string()))?;
+        let text = std::str::from_utf8(&bytes).map_err(|error| refuse(error.to_string()))?;
+        // Its own display quotes the text over several lines.
+        let file: Self = toml::from_str(text).map_err(|error| {
+            let line = whole_file::line_of(text, error.span().map_or(0, |span| span.start));
+            refuse(format!("line {line}: {}", error.message()))
+        })?;
         if file.version != VERSION {
             return Err(refuse(format!("key `version`: expected {VERSION}, found {}", file.version)));
+        }
+        for (key, value) in &file.nominal {
+            if value.is_nan() || value.abs() > LARGEST {
+                return Err(refuse(format!("key `nominal.{key}`: expected -{LARGEST} to {LARGEST}, found {value}")));
+            }
+        }
+        for part in &file.interval {
+            if ![part.value, part.interval90[0], part.interval90[1]].iter().all(|v| v.is_finite()) {
+                return Err(refuse(format!("key `interval`: expected finite numbers for {}", part.key)));
+            }
         }
         for effect in &file.effects.model {
             effect.check().map_err(|error| refuse(format!("key `effects.model`: {error}")))?;
@@ -105,14 +127,19 @@ impl ModelFile {
     ///
     /// # Errors
     ///
-    /// [`Error::Model`] for a key that is nothing to re-tune in this log.
+    /// [`Error::Model`] for a key that is nothing to re-tune in this log, or a value that it cannot have.
     pub fn apply(&self, nominal: &mut Nominal) -> Result<(), Error> {
         for (key, value) in &self.nominal {
             let known: Vec<String> = nominal.tunables.iter().map(|tunable| tunable.key.clone()).collect();
             let Some(tunable) = nominal.tunables.iter_mut().find(|tunable| tunable.key == *key) else {
+                let key = one_line(key, 100);
                 let reason = format!("key `nominal.{key}`: expected one of {}", known.join(", "));
                 return Err(Error::Model { reason });
             };
+            if !tunable.takes(*value) {
+                let reason = format!("key `nominal.{key}`: expected more than 0, found {value}");
+                return Err(Error::Model { reason });
+            }
             tunable.mean = *value;
         }
         nominal.effects.extend(self.effects.model.iter().cloned());
@@ -126,5 +153,45 @@ impl ModelFile {
     /// [`Error::Model`] for a value that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, Error> {
         toml::to_string(self).map_err(|error| Error::Model { reason: error.to_string() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_model_is_refused_in_one_line_that_names_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("model.toml");
+        let long = format!("version = 1\n{} = 1", "a".repeat(100_000));
+        let cases: [(&[u8], &str); 7] = [
+            (b"version = 1\n[nominal]\na = = 2\n", "line 3"),
+            (b"version = 1\n\"a\\nb\" = 1", "a b"),
+            (long.as_bytes(), "unknown field"),
+            (b"\xff", "utf-8"),
+            (b"version = 1\n[nominal]\na = nan\n", "`nominal.a`: expected -1000000 to 1000000, found NaN"),
+            (b"version = 1\n[nominal]\na = 1e308\n", "`nominal.a`"),
+            (b"version = 1\n[[interval]]\neffect = 'a'\nkey = 'b'\nvalue = inf\ninterval90 = [0, 1]\n", "finite"),
+        ];
+        for (bytes, expected) in cases {
+            std::fs::write(&file, bytes).unwrap();
+            let message = ModelFile::read(&file).unwrap_err().to_string();
+            assert!(message.contains(expected) && message.contains("model.toml"), "{message}");
+            assert!(!message.contains(char::is_control) && message.len() < 1000, "{message:?}");
+        }
+        let device = ModelFile::read(Path::new("/dev/zero")).unwrap_err().to_string();
+        assert!(device.contains("no plain file"), "{device}");
+    }
+
+    #[test]
+    fn a_mass_of_nothing_is_no_nominal_model() {
+        let text = |mass: f64| format!("version = 1\n[nominal]\n\"object.mass_kg\" = {mass:?}\n");
+        let mut nominal = crate::nominal::tests::uncertain_mass();
+        for (mass, good) in [(0.3, true), (0.0, false), (-1.0, false)] {
+            let file: ModelFile = toml::from_str(&text(mass)).unwrap();
+            assert_eq!(file.apply(&mut nominal).is_ok(), good, "{mass}");
+        }
+        assert_eq!(nominal.tunables[0].mean, 0.3);
     }
 }

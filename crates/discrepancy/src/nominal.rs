@@ -68,6 +68,11 @@ impl Tunable {
         if self.positive { self.mean * (z * self.stddev / self.mean).exp() } else { self.mean + z * self.stddev }
     }
 
+    /// Whether it can have a value: what is scaled is above 0.
+    pub(crate) fn takes(&self, value: f64) -> bool {
+        value.is_finite() && (!self.positive || value > 0.0)
+    }
+
     /// The coordinate z of a value.
     #[must_use]
     pub fn coordinate(&self, value: f64) -> f64 {
@@ -259,5 +264,34 @@ fn sizes(shape: &Shape) -> Vec<Number> {
         Shape::Sphere { radius_m } => vec![*radius_m],
         // Its outline is fixed.
         Shape::Prism { .. } => Vec::new(),
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use measured_log::{Noise, Object, Robot, SplitConfig, Table};
+
+    use super::*;
+
+    /// A ball of which only the mass may be re-tuned.
+    pub(crate) fn uncertain_mass() -> Nominal {
+        let header = Header {
+            robot: Robot::None,
+            period_secs: 0.01,
+            tool_radius_m: None,
+            tool_friction: None,
+            gravity_mps2: 9.81,
+            table: Table { height_m: 0.0.into(), friction: 0.4.into() },
+            object: Object {
+                shape: Shape::Sphere { radius_m: 0.03.into() },
+                mass_kg: Number::Uncertain { mean: 0.2, stddev: 0.02 },
+                com_m: [0.0.into(); 3],
+                inertia_kgm2: None,
+                restitution: None,
+            },
+            noise: Noise::default(),
+            split: SplitConfig { holdout_fraction: 0.5 },
+        };
+        Nominal::new(&header, RigTool::None).unwrap()
     }
 }

@@ -106,7 +106,7 @@ impl RawObject {
 /// Parses `text`, the content of `path`.
 pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
     let value: toml::Table = toml::from_str(text).map_err(|e| {
-        let line = e.span().map_or(1, |span| text.bytes().take(span.start).filter(|b| *b == b'\n').count() + 1);
+        let line = whole_file::line_of(text, e.span().map_or(0, |span| span.start));
         Error::Syntax { path: path.to_owned(), reason: format!("line {line}: {}", one_line(e.message())) }
     })?;
     // The version alone comes first, so that an old file says so instead of listing unknown keys.
@@ -116,7 +116,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
         return Err(Error::Version { path: path.to_owned(), found: crate::error::excerpt(&found.to_string()) });
     }
     let mut raw: Raw = serde_path_to_error::deserialize(Value::Table(value)).map_err(|error| {
-        let mut key = error.path().to_string();
+        let mut key = whole_file::one_line(&error.path().to_string(), 200);
         let reason = one_line(error.into_inner().message());
         // serde reports an unknown or a missing key on its table: the key itself stands in the message.
         let named = ["unknown field `", "missing field `"].iter().find_map(|start| reason.strip_prefix(start));
@@ -154,8 +154,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
 
 /// A parser's message on one line of bounded length.
 fn one_line(message: &str) -> String {
-    let words: Vec<&str> = message.split_whitespace().collect();
-    words.join(" ").chars().take(300).collect()
+    whole_file::one_line(message, 300)
 }
 
 /// TOML text that [`parse`] reads back to the same header, with `notes` as comments.

@@ -15,7 +15,10 @@ pub(crate) fn decode(file: impl Read, robot: Robot) -> Result<Vec<Episode>, Fail
         .iter()
         .map(|name| match std::str::from_utf8(name) {
             Ok(name) => Ok(name.to_string()),
-            Err(_) => Err(Problem::column(String::from_utf8_lossy(name), "expected UTF-8 text")),
+            Err(_) => {
+                let found = crate::error::excerpt(&String::from_utf8_lossy(name));
+                Err(Problem::column(found.trim_matches('`'), "expected UTF-8 text"))
+            }
         })
         .collect::<Result<_, _>>()?;
     let mut names: Vec<&str> = names.iter().map(String::as_str).collect();

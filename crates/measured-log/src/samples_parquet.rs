@@ -39,12 +39,12 @@ impl From<Problem> for Failure {
 pub(crate) fn decode(bytes: Bytes, robot: Robot) -> Result<Vec<Episode>, Failure> {
     // parquet 60.1 panics on some damaged pages (one of 8000 mutated files: a page of a dictionary that is not there), where it should
     // return an error; that must not end the program.
-    let result = std::panic::catch_unwind(|| decode_trusting(bytes, robot));
-    result.unwrap_or_else(|_| Err(Failure::Parquet("a page contradicts its header".into())))
+    let result = whole_file::caught(|| decode_trusting(bytes, robot));
+    result.unwrap_or_else(|| Err(Failure::Parquet("a page contradicts its header".into())))
 }
 
 fn decode_trusting(bytes: Bytes, robot: Robot) -> Result<Vec<Episode>, Failure> {
-    let unreadable = |e: ParquetError| Failure::Parquet(e.to_string());
+    let unreadable = |e: ParquetError| Failure::Parquet(whole_file::one_line(&e.to_string(), 300));
     let builder = ParquetRecordBatchReaderBuilder::try_new(bytes).map_err(unreadable)?;
     let schema = builder.schema().clone();
     let names: Vec<&str> = schema.fields().iter().map(|field| field.name().as_str()).collect();

@@ -336,3 +336,24 @@ proptest! {
         prop_assert_eq!(ids(&reversed, &reversed.split(seed).holdout), ids(&log, &split.holdout));
     }
 }
+
+#[test]
+fn what_a_message_quotes_is_one_line_and_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path();
+    let refused = |header: &[u8], samples: &[u8]| {
+        std::fs::write(dir.join("log.toml"), header).unwrap();
+        std::fs::write(dir.join("samples.csv"), samples).unwrap();
+        let message = measured_log::read(dir).unwrap_err().to_string();
+        assert!(!message.contains(char::is_control) && message.len() < 1500, "{message:?}");
+        message
+    };
+    let header = include_bytes!("fixtures/log.toml");
+    let column = refused(header, b"episode,\x07\xff\x00name\n");
+    assert!(column.contains("samples.csv") && column.contains("expected UTF-8 text"), "{column}");
+    let long = [header.as_slice(), b"\n[split.", &b"a".repeat(100_000), b"]\n"].concat();
+    assert!(refused(&long, b"").contains("log.toml"));
+    let torn = [b"\"a\\nb\" = 1\n".as_slice(), header].concat();
+    let torn = refused(&torn, b"");
+    assert!(torn.contains("log.toml, key `a b`: unknown field `a b`"), "{torn}");
+}

@@ -1,4 +1,5 @@
-//! Files that appear whole or not at all: a program killed at any moment leaves the old file or the new one.
+//! What goes out of a program and comes into it. Files appear whole or not at all: a program killed at any moment leaves the old file or the new one. Those of
+//! others are read in bounded memory, and quoted in one line. What is printed may meet a closed pipe.
 //!
 //! # Example
 //!
@@ -11,8 +12,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use std::io::{self, Write as _};
+use std::cell::Cell;
+use std::io::{self, Read as _, Write as _};
+use std::panic::{UnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 
 /// What to do with a file that is already there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,13 +46,35 @@ impl Error {
     }
 }
 
+/// Prints to standard output. A reader that has seen enough, and closed the pipe, is no error.
+///
+/// # Errors
+///
+/// Where the output cannot be written, as on a full disk.
+pub fn print(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        printed => printed,
+    }
+}
+
+/// Says something on standard error, where anybody listens.
+pub fn say(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
 /// Writes `bytes` to a hidden temporary file beside `path`, syncs it, gives it its name and syncs the folder, which must exist. Returns
 /// whether it did: with [`Existing::Keep`] a file that is there, or that somebody else wrote meanwhile, stays.
 ///
 /// # Errors
 ///
-/// [`Error`] where the operating system refuses; nothing is left behind then.
+/// [`Error`] where the operating system refuses, and where what is there is a device or a pipe, which would be replaced by a file; nothing is left behind
+/// then.
 pub fn write(path: &Path, bytes: &[u8], existing: Existing) -> Result<bool, Error> {
+    if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        return Err(Error::at("replace", path)(io::Error::other("it is no plain file")));
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
     let mut builder = tempfile::Builder::new();
@@ -74,6 +100,74 @@ pub fn write(path: &Path, bytes: &[u8], existing: Existing) -> Result<bool, Erro
     #[cfg(unix)]
     std::fs::File::open(folder).and_then(|folder| folder.sync_all()).map_err(Error::at("sync the folder", folder))?;
     Ok(true)
+}
+
+/// Reads a plain file of at most `most_bytes`: a pipe or a device could block or never end, and so could a file that grows.
+///
+/// # Errors
+///
+/// [`Error`] where it is no plain file or larger, and where the operating system refuses.
+pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>, Error> {
+    let at = |kind, text: String| Error::at("read", path)(io::Error::new(kind, text));
+    let about = std::fs::metadata(path).map_err(Error::at("read", path))?;
+    if !about.is_file() {
+        return Err(at(io::ErrorKind::InvalidInput, "it is no plain file".into()));
+    }
+    let too_large =
+        |found| at(io::ErrorKind::FileTooLarge, format!("expected at most {most_bytes} bytes, found {found}"));
+    if about.len() > most_bytes {
+        return Err(too_large(about.len().to_string()));
+    }
+    let mut bytes = Vec::with_capacity(usize::try_from(about.len()).unwrap_or(0));
+    let file = std::fs::File::open(path).map_err(Error::at("read", path))?;
+    file.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes).map_err(Error::at("read", path))?;
+    if bytes.len() as u64 > most_bytes { Err(too_large("more".into())) } else { Ok(bytes) }
+}
+
+/// Number, from 1, of the line of a text that holds the byte at `offset`.
+#[must_use]
+pub fn line_of(text: &str, offset: usize) -> usize {
+    1 + text.bytes().take(offset).filter(|byte| *byte == b'\n').count()
+}
+
+/// Text of a file as part of a message: on one line, without control characters, cut after `most_chars`.
+///
+/// ```
+/// assert_eq!(whole_file::one_line("unknown key `a\nb\u{7}`", 14), "unknown key `a…");
+/// assert_eq!(whole_file::one_line(" two\n  lines ", 14), "two lines");
+/// ```
+#[must_use]
+pub fn one_line(text: &str, most_chars: usize) -> String {
+    // Words of a text that is far too long are not all looked at.
+    let text = text.char_indices().nth(most_chars.saturating_mul(8)).map_or(text, |(end, _)| &text[..end]);
+    let spaced = |c: char| c.is_control() || c.is_whitespace();
+    let words: Vec<&str> = text.split(spaced).filter(|word| !word.is_empty()).collect();
+    let line = words.join(" ");
+    match line.char_indices().nth(most_chars) {
+        Some((end, _)) => format!("{}…", &line[..end]),
+        None => line,
+    }
+}
+
+/// Runs a decoder of others that panics where it should return an error; `None` where it did. The panic says nothing on standard error, where
+/// an error of one sentence follows; all others say what they always do.
+pub fn caught<T>(decode: impl FnOnce() -> T + UnwindSafe) -> Option<T> {
+    thread_local! {
+        static QUIET: Cell<bool> = const { Cell::new(false) };
+    }
+    static HOOK: Once = Once::new();
+    HOOK.call_once(|| {
+        let loud = take_hook();
+        set_hook(Box::new(move |panic| {
+            if !QUIET.get() {
+                loud(panic);
+            }
+        }));
+    });
+    let before = QUIET.replace(true);
+    let result = catch_unwind(decode);
+    QUIET.set(before);
+    result.ok()
 }
 
 /// Removes the temporary files that killed writers have left in `folder`, not below it; nobody may be writing there. Returns how many.
@@ -115,6 +209,29 @@ mod tests {
             assert_eq!(std::fs::read(&path).unwrap(), content);
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_decoder_that_panics_is_caught_and_others_go_on() {
+        assert_eq!(caught(|| 7), Some(7));
+        assert_eq!(caught(|| Vec::<u8>::new()[0]), None);
+        // Also within another one.
+        assert_eq!(caught(|| caught(|| Vec::<u8>::new()[0])), Some(None));
+        assert_eq!(caught(|| 8), Some(8));
+    }
+
+    #[test]
+    fn what_is_no_plain_file_or_too_large_is_not_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, "12345").unwrap();
+        assert_eq!(read(&path, 5).unwrap(), b"12345");
+        let error = read(&path, 4).unwrap_err();
+        assert_eq!(error.source.to_string(), "expected at most 4 bytes, found 5");
+        assert_eq!(read(folder.path(), 4).unwrap_err().source.to_string(), "it is no plain file");
+        assert_eq!(read(&folder.path().join("b"), 4).unwrap_err().source.kind(), io::ErrorKind::NotFound);
+        #[cfg(unix)]
+        assert_eq!(read(Path::new("/dev/zero"), 4).unwrap_err().source.to_string(), "it is no plain file");
     }
 
     #[test]

@@ -163,3 +163,20 @@ fn a_manifest_that_contradicts_its_shards_is_refused_by_key() {
         assert!(error.contains("info.json") && error.contains(key), "{error}");
     }
 }
+
+#[test]
+fn a_manifest_that_promises_more_than_memory_is_refused() {
+    let (dir, plan) = (tempfile::tempdir().unwrap(), plan());
+    make(dir.path(), &plan);
+    let path = dir.path().join("meta/info.json");
+    let text = std::fs::read_to_string(&path).unwrap();
+    for episodes in [1_000_000_000_u64, 1 << 62] {
+        let mut manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
+        manifest["shards"][0]["episodes"] = episodes.into();
+        manifest["episodes"] = (episodes + 15).into();
+        manifest["transitions"] = 0.into();
+        std::fs::write(&path, manifest.to_string()).unwrap();
+        let error = Reader::open(dir.path()).unwrap().episodes().unwrap_err().to_string();
+        assert!(error.contains("info.json") && error.contains("shards[0].episodes"), "{error}");
+    }
+}
