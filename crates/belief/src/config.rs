@@ -1,12 +1,14 @@
 //! Settings of the rejection filter. Every key is required: a scenario states what it runs.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
 /// Settings of [`crate::RejectionFilter`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "RejectionConfig")]
 pub struct Config {
     /// Particles of a belief: N.
     pub particles: usize,

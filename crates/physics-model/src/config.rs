@@ -1,11 +1,12 @@
 //! What a scenario says about the world, the task and the sensors. Every quantity carries its unit in its name.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::EffectConfig;
 
 /// What the obstacle, if there is one, can do: part of the domain, not of Θ.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ObstacleMobility {
     /// Fixed to the table.
@@ -15,7 +16,7 @@ pub enum ObstacleMobility {
 }
 
 /// Time base, contact and solver settings of the rapier world.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldConfig {
     /// Duration of one control step, s.
@@ -45,7 +46,7 @@ pub struct WorldConfig {
 }
 
 /// How the arm follows its commands.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ArmConfig {
     /// The tool is where it is commanded to be, whatever it touches.
@@ -61,7 +62,7 @@ pub enum ArmConfig {
 /// joints, because a measured deflection of the tool cannot tell those of seven joints apart. It is a stiffness and no natural
 /// frequency: a stiffness is read off a static test, and the links' inertia without that of the rotors, which URDF does not know, would make
 /// the wrist a thousand times as soft as the base.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ServoConfig {
     /// K, N·m/rad. A force f deflects the tool by J Jᵀ f / K.
@@ -88,7 +89,7 @@ impl ArmConfig {
 }
 
 /// Axis-aligned box that the tool centre may occupy, m, base frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReachConfig {
     /// Smallest and largest x, m.
@@ -108,7 +109,7 @@ impl ReachConfig {
 }
 
 /// Circle on the table that the object's centre has to reach.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GoalConfig {
     /// Centre x, m, base frame.
@@ -120,7 +121,7 @@ pub struct GoalConfig {
 }
 
 /// Rewards of one action.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RewardConfig {
     /// Every action.
@@ -138,7 +139,7 @@ pub struct RewardConfig {
 }
 
 /// The task.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TaskConfig {
     /// Most actions in an episode.
@@ -167,7 +168,7 @@ impl TaskConfig {
 }
 
 /// Standard deviations of the sensors' Gaussian noise.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseConfig {
     /// Joint positions, rad.
@@ -185,7 +186,7 @@ pub struct NoiseConfig {
 }
 
 /// What the arm senses at its wrist or joints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ForceSensing {
     /// Joint positions, and force and torque at the wrist (Sawyer): 7 + 6 values.
@@ -195,19 +196,20 @@ pub enum ForceSensing {
 }
 
 /// Sensors and force limits of an arm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorConfig {
     /// What is sensed besides the object's pose.
     pub force: ForceSensing,
     /// Force at the wrist (N) or torque at a joint (N·m) above which a force is large: the arm stops its move there.
+    #[schemars(extend("x-unit" = "N or N·m"))]
     pub large_force_limit: f64,
     /// Noise.
     pub noise: NoiseConfig,
 }
 
 /// Gaussian noise of artificial reinvigoration: standard deviation of each kind of value.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PerturbConfig {
     /// Positions of object and obstacle, m, horizontally.
@@ -230,7 +232,7 @@ pub struct PerturbConfig {
 
 /// What the model takes to be its own error in one action: standard deviations of Gaussians that a filter on continuous observations adds to the
 /// simulated end of the action, whose pose it then corrects by the measured one. 0 is an exact model.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelErrorConfig {
     /// x and y of the object, m.

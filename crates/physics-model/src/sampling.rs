@@ -3,6 +3,7 @@
 use pomdp::Rng;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, Gamma};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{Continuous as _, ContinuousCDF as _, Normal};
 
@@ -18,8 +19,9 @@ const OBSTACLE_MASS_KG: [f64; 2] = [0.02, 200.0];
 const MOST_DRAWS: usize = 1000;
 
 /// Gaussian cut off at `low` and `high`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-quantity" = true))]
 pub struct TruncatedNormal {
     /// Mean before cutting.
     pub mean: f64,
@@ -68,12 +70,14 @@ impl TruncatedNormal {
 }
 
 /// Gamma distribution by mean and shape.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("x-quantity" = true))]
 pub struct GammaMean {
     /// Mean.
     pub mean: f64,
     /// Shape k; the standard deviation is mean / √k.
+    #[schemars(extend("x-unit" = ""))]
     pub shape: f64,
 }
 
@@ -97,7 +101,7 @@ impl GammaMean {
 }
 
 /// Sizes for each shape, m.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SizeDistribution {
     /// Box: full lengths x, y, z.
@@ -128,7 +132,7 @@ impl SizeDistribution {
 }
 
 /// Distribution of the target object.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObjectDistribution {
     /// Probabilities of box, cylinder, sphere.
@@ -150,7 +154,7 @@ pub struct ObjectDistribution {
 }
 
 /// Distribution of the obstacle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleDistribution {
     /// Probabilities of box, cylinder, sphere, none.
@@ -168,7 +172,7 @@ pub struct ObstacleDistribution {
 }
 
 /// Distribution of worlds: Θ and initial state.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldDistribution {
     /// Target object.

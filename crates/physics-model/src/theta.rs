@@ -1,11 +1,12 @@
 //! Θ: the physical parameters, fixed in an episode and unknown to the robot.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::EffectValue;
 
 /// Shape of the target object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectShape {
     /// Cuboid; sizes are its full lengths along x, y, z.

@@ -370,7 +370,7 @@ fn a_hidden_obstacle_stops_the_tool_where_it_stands_and_a_movable_one_is_pushed(
     // Its face is at 35 mm, the ball's at 45 mm: 10 mm of overlap, 2 of them free, at 50 N/mm.
     let (wrench, bodies) = push(&hidden(false));
     assert_near(-wrench.force_n[1], 400.0, 0.02, "resistance");
-    assert_eq!(bodies[0].position_m[1], 0.06_f32.into());
+    assert_eq!(bodies[0].position_m[1], f64::from(0.06_f32));
     let (_, bodies) = push(&hidden(true));
     assert!((bodies[0].position_m[1] - 0.07).abs() < 0.002, "{:?}", bodies[0].position_m);
     assert_eq!(push(&[]).0, Wrench::default());

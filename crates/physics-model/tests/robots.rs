@@ -341,6 +341,27 @@ fn missing_urdf_and_unknown_joint_say_where_and_what() {
 }
 
 #[test]
+fn numbers_that_no_arm_has_are_refused() {
+    let text = std::fs::read_to_string(root().join("assets/robots/sawyer.urdf")).expect("URDF");
+    let folder = std::env::temp_dir().join(format!("surmise-arms-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("folder");
+    let file = folder.join("arm.urdf");
+    let config = RobotConfig { urdf: file.clone(), ..config("sawyer") };
+    // The first value of each that belongs to a joint or link of the arm.
+    for (from, to) in [
+        ("<mass value=\"5.3213\"", "<mass value=\"1e308\""),
+        ("ixx=\"0.053314\"", "ixx=\"1e300\""),
+        ("<axis xyz=\"0 0 1.0\"", "<axis xyz=\"0 0 1e308\""),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&file, text.replace(from, to)).expect("file");
+        let message = Robot::load(&config, &root()).expect_err(to).to_string();
+        assert!(message.contains("arm.urdf") && message.contains("expected"), "{message}");
+    }
+    std::fs::remove_dir_all(&folder).expect("removed");
+}
+
+#[test]
 fn inverse_dynamics_agree_with_pinocchio() {
     // Sawyer's URDF leaves out three helper links of 1e-8 kg and Pinocchio reads it as given: nothing to tolerate but rounding.
     for name in ["sawyer", "jaco"] {

@@ -1,12 +1,14 @@
 //! Settings of a search. Every key but `backup` is required: a scenario states what it runs.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
 /// Settings of [`crate::Pomcp`] and [`crate::Pomcpow`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(rename = "PlannerConfig")]
 pub struct Config {
     /// Work per decision.
     pub budget: Budget,
@@ -36,7 +38,7 @@ pub struct Config {
 }
 
 /// Work per decision, of all trees together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Budget {
     /// Exactly this many simulations.
@@ -50,7 +52,7 @@ pub enum Budget {
 }
 
 /// Constant c of UCB1.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Exploration {
     /// This value, in units of reward.
@@ -61,7 +63,7 @@ pub enum Exploration {
 }
 
 /// Length of a rollout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum RolloutDepth {
     /// To the horizon of the simulation, as published.
@@ -71,7 +73,7 @@ pub enum RolloutDepth {
 }
 
 /// What a policy is asked for at a new node.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ActionPriors {
     /// Nothing: every action is legal and unvisited.
@@ -83,7 +85,7 @@ pub enum ActionPriors {
 }
 
 /// How observations branch the tree.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Observations {
     /// One branch per class of observations ([`pomdp::Discretise`]): [`crate::Pomcp`].
@@ -100,7 +102,7 @@ pub enum Observations {
 }
 
 /// What goes up from a node to the action that led there.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Backup {
     /// The return of the simulation, as published: V(ha) is the mean return of simulations that explore.

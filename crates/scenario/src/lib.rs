@@ -12,13 +12,21 @@
 
 mod assemble;
 mod error;
+mod explain;
+mod file_schema;
+mod format;
+mod layers;
 mod load;
 mod provenance;
 mod schema;
+mod suggest;
 mod tracker;
 
 pub use assemble::Problem;
 pub use error::Error;
+pub use explain::Explanation;
+pub use file_schema::{FileKind, file_schema};
+pub use layers::{LayerKind, Source};
 pub use load::{Selection, find_root};
 pub use provenance::commit;
 pub use schema::{

@@ -1,11 +1,12 @@
-//! Layers of TOML, later values winning: base, robot, preset, domain, quick, effects of a model, `--set`. A resolved scenario is a layer that holds everything: it
-//! replaces all before it.
+//! Which files a scenario is made of, and how they are read.
 
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use toml::{Table, Value};
+use whole_file::one_line;
 
+use crate::layers::{LayerKind, Layers};
 use crate::{Error, Scenario, VERSION};
 
 /// Which scenario to load.
@@ -48,82 +49,39 @@ impl Selection {
     ///
     /// [`Error`] with file, key and expectation.
     pub fn load(&self) -> Result<Scenario, Error> {
+        self.layers()?.resolve()
+    }
+
+    /// Reads the layers.
+    pub(crate) fn layers(&self) -> Result<Layers, Error> {
         let scenarios = self.root.join("scenarios");
-        let paths = [
-            scenarios.join("base.toml"),
-            locate("robot", &self.robot, &scenarios.join("robots"))?,
-            locate("preset", &self.preset, &scenarios.join("presets"))?,
-            locate("domain", &self.domain, &scenarios)?,
-        ];
         let quick = self.quick.then(|| scenarios.join("presets/quick.toml"));
-        let mut layers = Vec::new();
-        for path in paths.into_iter().chain(quick) {
-            let table = read(&path)?;
-            if RESOLVED_KEYS.iter().all(|key| table.contains_key(*key)) {
-                layers.clear();
-            }
-            layers.push(Layer { name: path.display().to_string(), table });
+        let paths = [
+            (LayerKind::Base, scenarios.join("base.toml")),
+            (LayerKind::Robot, locate("robot", &self.robot, &scenarios.join("robots"))?),
+            (LayerKind::Preset, locate("preset", &self.preset, &scenarios.join("presets"))?),
+            (LayerKind::Domain, locate("domain", &self.domain, &scenarios)?),
+        ];
+        let mut layers = Layers::default();
+        for (kind, path) in paths.into_iter().chain(quick.map(|path| (LayerKind::Quick, path))) {
+            layers.push(kind, path.display().to_string(), read(&path)?);
         }
         if let Some(path) = &self.effects {
-            layers.push(Layer { name: path.display().to_string(), table: read_effects(path)? });
+            layers.push(LayerKind::Effects, path.display().to_string(), read_effects(path)?);
         }
         for text in &self.set {
-            layers.push(Layer { name: format!("--set {text}"), table: parse_override(text)? });
+            layers.push(LayerKind::Set, format!("--set {}", one_line(text, QUOTED)), parse_override(text)?);
         }
-        let mut merged = Table::new();
-        for layer in &layers {
-            merge(&mut merged, &layer.table);
-        }
-        let scenario: Scenario = serde_path_to_error::deserialize(Value::Table(merged)).map_err(|error| {
-            let mut key = error.path().to_string();
-            let message = error.into_inner().to_string();
-            let message = message.trim();
-            // serde reports an unknown key on its table: the key itself stands in the message.
-            if let Some(unknown) = message.strip_prefix("unknown field `").and_then(|m| m.split('`').next())
-                && !key.ends_with(unknown)
-            {
-                key = if key == "." { unknown.to_string() } else { format!("{key}.{unknown}") };
-            }
-            Error::Key { file: origin(&layers, &key), key, message: message.replace('\n', " ") }
-        })?;
-        let problem = scenario
-            .problem()
-            .or_else(|| scenario.planner.validate().err().map(|e| e.to_string()))
-            .or_else(|| scenario.belief.rejection.validate().err().map(|e| e.to_string()))
-            .or_else(|| scenario.belief.weighted.validate().err().map(|e| e.to_string()))
-            .or_else(|| {
-                // Else a restart late in an episode would be left out without a word.
-                let w = &scenario.belief.weighted;
-                let needed = w.history_limit * w.particles_min;
-                let short = w.restart_transitions > 0 && w.restart_transitions < needed;
-                short.then(|| {
-                    let found = w.restart_transitions;
-                    format!("belief.weighted.restart_transitions: expected 0 or history_limit × particles_min = {needed}, found {found}")
-                })
-            })
-            .or_else(|| {
-                let classes = scenario.planner.observations == planner::Observations::Classes;
-                (!classes).then(|| {
-                    "planner.observations: expected \"classes\", which is all that the agent searches with".into()
-                })
-            });
-        match problem {
-            Some(problem) => {
-                let key = problem.split(':').next().unwrap_or_default();
-                Err(Error::Value { file: origin(&layers, key), problem })
-            }
-            None => Ok(scenario),
-        }
+        Ok(layers)
     }
 }
 
-/// A file with these keys is a resolved scenario, not a layer.
-const RESOLVED_KEYS: [&str; 4] = ["name", "preset", "robot", "version"];
-
-struct Layer {
-    name: String,
-    table: Table,
-}
+/// Size of a file.
+const MOST_BYTES: u64 = 4 << 20;
+/// Characters of a file that a message quotes.
+pub(crate) const QUOTED: usize = 200;
+/// Characters of what is wrong.
+pub(crate) const SENTENCE: usize = 1000;
 
 /// The nearest folder at or above `start` that holds `scenarios/base.toml`.
 ///
@@ -163,19 +121,26 @@ fn read(path: &Path) -> Result<Table, Error> {
     struct Head {
         version: Option<Value>,
     }
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Read { file: path.to_path_buf(), source })?;
-    let syntax = |message: String| Error::Syntax {
-        file: path.to_path_buf(),
-        message: message.lines().collect::<Vec<_>>().join(" "),
-    };
+    let bytes = whole_file::read(path, MOST_BYTES)
+        .map_err(|error| Error::Read { file: path.to_path_buf(), source: error.source })?;
+    let syntax = |message: &str| Error::Syntax { file: path.to_path_buf(), message: one_line(message, SENTENCE) };
+    let text = std::str::from_utf8(&bytes)
+        .map_err(|e| syntax(&format!("expected UTF-8 text, found another byte at {}", e.valid_up_to())))?;
     // The version alone comes first, so that an old file says so instead of listing unknown keys.
-    let head: Head = toml::from_str(&text).map_err(|e| syntax(e.to_string()))?;
+    let head: Head = toml::from_str(text).map_err(|e| syntax(&toml_problem(text, &e)))?;
     if let Some(found) = head.version
         && found.as_integer() != Some(i64::from(VERSION))
     {
-        return Err(Error::Version { file: path.to_path_buf(), found: found.to_string(), expected: VERSION });
+        let found = one_line(&found.to_string(), QUOTED);
+        return Err(Error::Version { file: path.to_path_buf(), found, expected: VERSION });
     }
-    toml::from_str(&text).map_err(|e| syntax(e.to_string()))
+    toml::from_str(text).map_err(|e| syntax(&toml_problem(text, &e)))
+}
+
+/// What a TOML parser says, with the line: its own display quotes the text over several lines.
+fn toml_problem(text: &str, error: &toml::de::Error) -> String {
+    let line = whole_file::line_of(text, error.span().map_or(0, |span| span.start));
+    format!("line {line}: {}", error.message())
 }
 
 /// What a model that `diagnose` wrote says to a scenario: the effects. The rest is about the object of its log.
@@ -202,7 +167,7 @@ fn nested([outer, inner]: [&str; 2], value: Value) -> Table {
 }
 
 fn parse_override(text: &str) -> Result<Table, Error> {
-    let error = || Error::Override { text: text.into() };
+    let error = || Error::Override { text: one_line(text, QUOTED) };
     let (key, value) = text.split_once('=').ok_or_else(error)?;
     let (key, value) = (key.trim(), value.trim());
     if key.is_empty() || key.contains(['\n', '#', '[']) || value.contains('\n') {
@@ -212,43 +177,6 @@ fn parse_override(text: &str) -> Result<Table, Error> {
     toml::from_str(&format!("{key} = {value}"))
         .or_else(|_| toml::from_str(&format!("{key} = \"{}\"", value.escape_default())))
         .map_err(|_| error())
-}
-
-/// Tables merge key by key, except one-variant enums (`budget = { transitions = … }`), which replace as a whole; everything else
-/// replaces.
-fn merge(into: &mut Table, from: &Table) {
-    for (key, value) in from {
-        match (into.get_mut(key), value) {
-            (Some(Value::Table(old)), Value::Table(new)) if !is_choice(key) => merge(old, new),
-            _ => {
-                into.insert(key.clone(), value.clone());
-            }
-        }
-    }
-}
-
-fn is_choice(key: &str) -> bool {
-    ["budget", "exploration", "rollout_depth"].contains(&key)
-}
-
-/// The last layer that says anything on `key` or, failing that, on the nearest table above it.
-fn origin(layers: &[Layer], key: &str) -> String {
-    let parts: Vec<&str> = key.split(['.', '[']).map(|p| p.trim_end_matches(']')).collect();
-    for length in (1..=parts.len()).rev() {
-        let found = layers.iter().rev().find(|layer| {
-            let mut value = None;
-            let mut table = Some(&layer.table);
-            for part in &parts[..length] {
-                value = table.and_then(|t| t.get(*part));
-                table = value.and_then(Value::as_table);
-            }
-            value.is_some()
-        });
-        if let Some(layer) = found {
-            return layer.name.clone();
-        }
-    }
-    layers.iter().map(|layer| layer.name.as_str()).collect::<Vec<_>>().join(" + ")
 }
 
 #[cfg(test)]
@@ -362,20 +290,46 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_file_key_and_expectation() {
+    fn what_a_file_quotes_stays_on_one_line_and_is_cut() {
+        let folder = std::env::temp_dir().join(format!("surmise-quotes-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("mine.toml");
+        let message = |bytes: &[u8]| {
+            std::fs::write(&file, bytes).unwrap();
+            load(|s| s.domain = file.display().to_string()).unwrap_err().to_string()
+        };
+        let long = format!("{} = 1", "a".repeat(100_000));
+        let cases: [(&[u8], &str); 6] = [
+            (b"\"a\\nb\" = 1", "a b"),
+            (b"a = \x07", "line 1"),
+            (b"\n\na = [", "line 3"),
+            (b"\xff", "UTF-8"),
+            (long.as_bytes(), "unknown field"),
+            (b"name = \"../D4\"", "name: expected 1 to 64 letters"),
+        ];
+        for (bytes, expected) in cases {
+            let message = message(bytes);
+            assert!(message.contains(expected) && message.contains("mine.toml"), "{message}");
+            assert!(!message.contains(char::is_control) && message.len() < 2000, "{message:?}");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+        let device = load(|s| s.domain = "/dev/zero".into()).unwrap_err();
+        assert!(matches!(device, Error::Read { .. }), "{device}");
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused_before_it_is_used() {
         let message = |set: &str| load(|s| s.set = vec![set.into()]).unwrap_err().to_string();
-        let unknown = message("task.horizn=3");
-        assert!(unknown.contains("--set task.horizn=3") && unknown.contains("`task.horizn`"), "{unknown}");
-        assert!(unknown.contains("horizon"), "{unknown}");
-        let wrong_type = message("task.horizon=\"far\"");
-        assert!(wrong_type.contains("task.horizon") && wrong_type.contains("expected"), "{wrong_type}");
-        let wrong_unit = message("task.goal.radius_cm=4");
-        assert!(wrong_unit.contains("radius_cm") && wrong_unit.contains("radius_m"), "{wrong_unit}");
-        let range = message("task.discount=1.5");
-        assert!(range.contains("task.discount") && range.contains("0 to 1"), "{range}");
-        let version = message("version=9");
-        assert!(version.contains("version"), "{version}");
-        assert!(message("nonsense").contains("key=value"));
+        let cases = [
+            ("world.arm_stiffness_npm=nan", "world.arm_stiffness_npm: expected above 0 N/m, found NaN"),
+            ("robot.home_rad=[nan, 0.0]", "robot: expected finite numbers in home_rad"),
+            ("robot.locked_joints.head_pan=inf", "robot: expected finite numbers in home_rad"),
+            ("robot.urdf=\"a\\tb.urdf\"", "robot.urdf: expected a path without control characters"),
+        ];
+        for (set, expected) in cases {
+            let message = message(set);
+            assert!(message.contains(expected), "{set}: {message}");
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ use physics_model::config::{
 };
 use physics_model::effect::{EffectConfig, EffectKind};
 use physics_model::robot::RobotConfig;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
@@ -17,7 +18,7 @@ use crate::Error;
 pub const VERSION: u32 = 1;
 
 /// A resolved scenario.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Format version.
@@ -59,7 +60,7 @@ pub struct Scenario {
 }
 
 /// How the arm follows its commands.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArmsConfig {
     /// In the true world.
@@ -69,7 +70,7 @@ pub struct ArmsConfig {
 }
 
 /// Effects beyond rigid bodies with Coulomb friction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EffectsConfig {
     /// In the true world.
@@ -79,7 +80,7 @@ pub struct EffectsConfig {
 }
 
 /// Which filter keeps the belief.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Filter {
     /// As published: [`belief::RejectionFilter`].
@@ -89,7 +90,7 @@ pub enum Filter {
 }
 
 /// Filters of the belief: all are set, one is used.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BeliefConfig {
     /// The one that is used.
@@ -121,7 +122,7 @@ impl BeliefConfig {
 }
 
 /// What the initial belief says of the obstacle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InitialObstacle {
     /// The domain's distribution.
@@ -131,7 +132,7 @@ pub enum InitialObstacle {
 }
 
 /// What the robot believes before it has acted.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InitialBeliefConfig {
     /// Obstacle.
@@ -139,7 +140,7 @@ pub struct InitialBeliefConfig {
 }
 
 /// The loop around belief, planner and prior.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AgentConfig {
     /// Draws from the learned prior after each action.
@@ -151,7 +152,7 @@ pub struct AgentConfig {
 }
 
 /// Default policy of simulations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rollouts {
     /// The tool goes to the object's centre, as published; a cut rollout is worth nothing more.
@@ -162,7 +163,7 @@ pub enum Rollouts {
 }
 
 /// Training data.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataConfig {
     /// Share of the episodes in which the obstacle can move.
@@ -176,7 +177,7 @@ pub struct DataConfig {
 }
 
 /// A published success rate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
     /// Successes.
@@ -186,7 +187,7 @@ pub struct Published {
 }
 
 /// Trials.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct EvaluationConfig {
     /// Trials a method.
@@ -284,7 +285,27 @@ impl Scenario {
             [t.reward.step, t.reward.large_force, t.reward.out_of_reach, t.reward.object_moved, t.reward.goal];
         let period = w.control_period_secs;
         let effects = self.effects.truth.iter().chain(&self.effects.model);
+        // They become names of folders and parts of messages.
+        let plain = |text: &str| {
+            (1..=64).contains(&text.len())
+                && text.starts_with(|c: char| c.is_ascii_alphanumeric())
+                && text.chars().all(|c| c.is_ascii_alphanumeric() || ".-_".contains(c))
+        };
+        let names = [("name", &self.name), ("preset", &self.preset), ("robot.name", &self.robot.name)];
+        let expected = "1 to 64 letters, digits, `.`, `_`, `-`, first a letter or digit";
         check(self.version == VERSION, "version", &format!("{VERSION}"), &self.version)
+            .or_else(|| names.iter().find_map(|(key, name)| check(plain(name), key, expected, name)))
+            .or_else(|| {
+                let urdf = self.robot.urdf.to_string_lossy();
+                check(!urdf.contains(char::is_control), "robot.urdf", "a path without control characters", &urdf)
+            })
+            .or_else(|| {
+                // Their ranges are the arm's business; what is no number would not even equal itself.
+                let r = &self.robot;
+                let numbers = r.home_rad.iter().chain(r.tool_rotation.iter().flatten()).chain(r.locked_joints.values());
+                let found = numbers.copied().find(|v| !v.is_finite())?;
+                check(false, "robot", "finite numbers in home_rad, tool_rotation and locked_joints", &found)
+            })
             .or_else(|| self.arm.truth.problem().map(|p| format!("arm.truth.{p}")))
             .or_else(|| self.arm.model.problem().map(|p| format!("arm.model.{p}")))
             .or_else(|| effects.clone().find_map(|effect| effect.problem().map(|p| format!("effects: {p}"))))
@@ -318,6 +339,10 @@ impl Scenario {
                     "above 0",
                     &w.contact_damping_ratio,
                 )
+            })
+            .or_else(|| {
+                let n = w.arm_stiffness_npm;
+                check(positive(n), "world.arm_stiffness_npm", "above 0 N/m", &n)
             })
             .or_else(|| check(w.table_height_m.abs() < 10.0, "world.table_height_m", "within 10 m", &w.table_height_m))
             .or_else(|| check(positive(w.gravity_mps2), "world.gravity_mps2", "above 0 m/s²", &w.gravity_mps2))

@@ -1,12 +1,13 @@
 //! Settings of the weighted filter. Every key is required: a scenario states what it runs.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
 use crate::config::require;
 
 /// Settings of [`crate::WeightedFilter`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WeightedConfig {
     /// Fewest particles of a resampled belief.

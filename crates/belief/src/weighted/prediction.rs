@@ -87,7 +87,7 @@ impl<M: StaticParameters> Prediction<M> {
 
     /// The states of each structure, ready for [`Neighbours::companion`].
     pub(crate) fn neighbours(&self) -> Vec<Neighbours> {
-        let of_kind = |kind| {
+        let of_kind = |kind: usize| {
             let fit = &self.fits[kind];
             let members: Vec<usize> = (0..self.states.len()).filter(|&i| self.kinds[i] == kind).collect();
             let weights: Vec<f64> = members.iter().map(|&i| self.weights[i]).collect();

@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{Effect, Parameter, Parametric};
@@ -13,14 +14,14 @@ use crate::theta::Theta;
 macro_rules! catalogue {
     ($($effect:ident: $description:literal),+ $(,)?) => {
         /// An effect as a scenario names it.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
         pub enum EffectConfig {
             $(#[doc = $description] $effect($effect),)+
         }
 
         /// Name of an effect without its values.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
         #[serde(rename_all = "snake_case")]
         pub enum EffectKind {
             $(#[doc = $description] $effect,)+

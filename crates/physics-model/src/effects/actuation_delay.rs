@@ -9,6 +9,7 @@
 //! Acts on the command (A), with linear interpolation between control steps. An action goes on after its last command until the arm has got
 //! there; forces and poses are read over the nominal duration, joint positions when the arm stands.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -17,7 +18,7 @@ use crate::effect::{CommandFilter, CommandStart, Effect, Hooks};
 use crate::state::MAX_JOINTS;
 
 /// Commands take time; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ActuationDelay {
     /// d, s.

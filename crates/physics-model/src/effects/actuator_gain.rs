@@ -8,6 +8,7 @@
 //!
 //! Acts on the command (A), of the tool centre for a kinematic arm and of the joints for a dynamic one. It shows in free motion, too.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -15,7 +16,7 @@ use crate::effect::{CommandFilter, CommandStart, Effect, Hooks};
 use crate::state::MAX_JOINTS;
 
 /// Gain of the command; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ActuatorGain {
     /// g.

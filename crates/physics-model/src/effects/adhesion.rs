@@ -10,6 +10,7 @@
 //! friction; what the wrist feels is the sum. The range stands for what a film or lip stretches before it lets go, and is wide enough for the
 //! first steps of a retreat to lie in it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -19,7 +20,7 @@ use crate::effect::{Effect, Hooks};
 const RANGE_M: f64 = 0.001;
 
 /// Tool and object stick together; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Adhesion {
     /// F₀, N.

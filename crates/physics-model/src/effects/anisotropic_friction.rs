@@ -10,6 +10,7 @@
 //! Acts on the contacts of free bodies with the table (K). Friction stays opposite to the slip. The grain belongs to the table and not to the
 //! object: turning the object changes nothing. What does not slip has no direction and is held by μ.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -19,7 +20,7 @@ use crate::effect::{Effect, Hooks, TableContact};
 const NO_SLIP_MPS: f64 = 1e-6;
 
 /// Friction by direction; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AnisotropicFriction {
     /// a.

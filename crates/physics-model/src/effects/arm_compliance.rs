@@ -8,13 +8,14 @@
 //! directions, solved implicitly. A dynamic arm has the stiffness of its servos instead. Deflections do not outlive an action: the next one starts,
 //! unloaded, from where the tool is. Neutral is an infinite stiffness.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, Hooks, Nominal};
 
 /// The tool gives way to forces; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArmCompliance {
     /// K, N/m.

@@ -10,6 +10,7 @@
 //! the same direction has its full length. Where each joint stands in its play outlives the action ([`crate::effect::Memory::play_rad`]);
 //! an episode starts in the middle of it. Needs joints: it does nothing to a tool without an arm.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -17,7 +18,7 @@ use crate::effect::{CommandFilter, CommandSpace, CommandStart, Effect, Hooks};
 use crate::state::MAX_JOINTS;
 
 /// Joints have play; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Backlash {
     /// Width of the play, rad.

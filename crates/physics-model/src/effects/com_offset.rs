@@ -9,6 +9,7 @@
 //! Acts on the object's mass properties (N); its inertia about the centre of mass stays. A sphere has no axes: its centre of mass gets as deep as
 //! the three shares together.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -19,7 +20,7 @@ use crate::theta::ObjectShape;
 const LARGEST: f64 = 0.45;
 
 /// Another centre of mass; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ComOffset {
     /// s_x, share of the length along the object's x.

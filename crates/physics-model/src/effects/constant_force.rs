@@ -8,13 +8,14 @@
 //!
 //! Acts as a force (F) at the object's centre of mass. A tilt pulls in proportion to the mass instead: a known added weight tells them apart.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{BodyRole, BodyView, Effect, Hooks, Load, Surroundings};
 
 /// A horizontal force on the object; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ConstantForce {
     /// Along x of the base frame, N.

@@ -7,6 +7,7 @@
 //! Acts on the force readings (O), along the base axes at the tool centre: the tool keeps its orientation, so that axes fixed to the sensor would
 //! only name the components otherwise. An arm with joint torque sensors shows the torques −Jᵀ b.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -14,7 +15,7 @@ use crate::effect::{Effect, ForceFilter, Hooks, ToolMoment};
 use crate::world::Wrench;
 
 /// The force sensor has an offset; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ForceBias {
     /// Along x of the base frame, N.

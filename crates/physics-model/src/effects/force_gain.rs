@@ -6,6 +6,7 @@
 //!
 //! Acts on the force readings (O). From pushing alone it cannot be told from a wrong mass: a known added weight can.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -13,7 +14,7 @@ use crate::effect::{Effect, ForceFilter, Hooks, ToolMoment};
 use crate::world::Wrench;
 
 /// The force sensor has another gain; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ForceGain {
     /// g.

@@ -7,6 +7,7 @@
 //! Acts on the force readings (O), solved exactly for forces that are constant in a control step. It starts settled at its first reading: the arm
 //! has stood still before.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -14,7 +15,7 @@ use crate::effect::{Effect, ForceFilter, Hooks, ToolMoment};
 use crate::world::Wrench;
 
 /// The force sensor is slow; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ForceLowPass {
     /// τ, s.

@@ -9,13 +9,14 @@
 //! Acts on the object's material (N). It is what Θ's own friction is, so that a model in which that one is unknown has no use for this: it is for
 //! logs whose friction was given as known.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, Hooks, Nominal};
 
 /// Another friction coefficient; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionLevel {
     /// μ.

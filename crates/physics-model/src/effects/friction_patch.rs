@@ -11,6 +11,7 @@
 //! Acts on the contacts of free bodies with the table (K). The engine knows one friction coefficient for all contacts of two shapes, so that the
 //! object gets four support points at its corners or rim, each a shape of its own: a patch under one side of the object turns it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -20,7 +21,7 @@ use crate::effect::{Effect, Hooks, Nominal, TableContact};
 const BORDER_M: f64 = 0.002;
 
 /// Other friction at a place; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionPatch {
     /// b.

@@ -12,6 +12,7 @@
 //! Acts as a further body of the world (N), upright on the table, with the friction of obstacles. The first size below 2 mm: no body. Where a
 //! movable one has got to outlives the action ([`crate::effect::Memory::hidden`]).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter};
@@ -22,7 +23,7 @@ use crate::theta::ObjectShape;
 const SMALLEST_M: f64 = 0.002;
 
 /// A body that Θ knows nothing of; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HiddenObstacle {
     /// Shape.

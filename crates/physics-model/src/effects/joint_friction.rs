@@ -9,6 +9,7 @@
 //! dynamic arm (A), whose joints then lag by τ / K. The sign is softened below 0.01 rad/s. A wrist sensor on a kinematic arm reads none of
 //! it.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -19,7 +20,7 @@ use crate::robot::JointVector;
 const SOFT_RPS: f64 = 0.01;
 
 /// Joints have friction; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointFriction {
     /// F_v, N·m·s/rad.

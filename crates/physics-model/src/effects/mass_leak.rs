@@ -8,6 +8,7 @@
 //!
 //! Acts on the object's mass (N), before each control step; the inertia follows in proportion, the centre of mass stays.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -17,7 +18,7 @@ use crate::effect::{Effect, Hooks};
 const LEAST: f64 = 0.05;
 
 /// The object loses mass; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MassLeak {
     /// λ, 1/s.

@@ -7,13 +7,14 @@
 //! Acts on the pose readings (O), by interpolation between control steps; several delays add up. An action ends with what is read at the end of its
 //! nominal duration: how far that lags behind outlives the action ([`crate::effect::Memory`]), the line of older poses does not.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, Hooks};
 
 /// Poses are read late; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseDelay {
     /// d, s.

@@ -6,6 +6,7 @@
 //!
 //! Acts on the pose readings (O), along the base axes.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -13,7 +14,7 @@ use crate::effect::{Effect, Hooks};
 use crate::state::BodyState;
 
 /// Poses are read beside where they are; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseOffset {
     /// Along x of the base frame, m.

@@ -7,6 +7,7 @@
 //! Acts on the pose readings (O), orientations and velocities included.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -15,7 +16,7 @@ use crate::sensor::unit;
 use crate::state::BodyState;
 
 /// The pose sensor's frame is turned; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseRotation {
     /// θ, rad, from +x towards +y.

@@ -7,6 +7,7 @@
 //! Acts on the pose readings (O) and on their velocities. In free fall it changes the apparent gravity by s; heights at rest tell it from a wrong
 //! clock.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -14,7 +15,7 @@ use crate::effect::{Effect, Hooks};
 use crate::state::BodyState;
 
 /// Distances are read longer or shorter; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseScale {
     /// s.

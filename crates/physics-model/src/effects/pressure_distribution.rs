@@ -10,13 +10,14 @@
 //! Acts on the object's colliders (N): four points at that share of the way from the centre to the corners (box) or the rim (cylinder) touch the table in
 //! their place. The rest of the sole hangs 0.3 mm higher and catches what would tip off them. A sphere touches at a point anyway: no effect.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, Hooks, Nominal};
 
 /// Support points nearer to the centre; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PressureDistribution {
     /// r_eff / R; 1 is the engine's own support at corners or rim.

@@ -6,13 +6,14 @@
 //!
 //! Acts as a force (F) at the centre of mass of every free body. Alone it lets the speed decay as v₀ / (1 + k v₀ t / m).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{BodyView, Effect, Hooks, Load, Surroundings};
 
 /// F = −k |v| v on every free body; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QuadraticDrag {
     /// k, N·s²/m².

@@ -8,13 +8,14 @@
 //!
 //! Acts as a torque (F) on spheres on the table. A sphere rolling without slip slows down by 5/7 c_rr g / r.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{BodyView, Effect, Hooks, Load, Surroundings};
 
 /// Torque c_rr N against the rolling of spheres; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RollingResistance {
     /// Lever arm c_rr, m.

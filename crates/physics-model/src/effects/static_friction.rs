@@ -9,6 +9,7 @@
 //! Acts on the contacts of free bodies with the table (K). The speed below which a contact sticks is above the creep that the solver leaves to
 //! contacts at rest, and far below the Stribeck velocity. That longer rest raises μ_s is left out.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -18,7 +19,7 @@ use crate::effect::{Effect, Hooks, TableContact};
 const STICKING_MPS: f64 = 0.0005;
 
 /// More friction before the slip; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StaticFriction {
     /// μ_s / μ_k.

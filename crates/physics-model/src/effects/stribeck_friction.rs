@@ -10,13 +10,14 @@
 //!
 //! Acts on the contacts of free bodies with the table (K). It shows at the end of a slide, and from v_s up hardly at all.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, Hooks, TableContact};
 
 /// More friction in slow slip; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StribeckFriction {
     /// Δ.

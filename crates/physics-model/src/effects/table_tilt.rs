@@ -8,13 +8,14 @@
 //!
 //! Acts as the direction of gravity (N): on every body in proportion to its mass.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, Hooks};
 
 /// Gravity g (s_x, s_y) along the table; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TableTilt {
     /// Slope angle along x, rad; positive pulls towards +x.

@@ -10,13 +10,14 @@
 //! Acts as a force (F) at the object's centre of mass, by where the centre of its shape is. Alone it lets the object swing with the period
 //! 2π √(m / k).
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{BodyRole, BodyView, Effect, Hooks, Load, Surroundings};
 
 /// A spring from the object to a point; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tether {
     /// k, N/m.

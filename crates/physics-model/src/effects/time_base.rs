@@ -9,6 +9,7 @@
 //! Acts on the duration of a control step (N), which really lasts 1 / r of what the clock says, and on the velocity readings (O). Commands and
 //! forces of a log have the same clock.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -16,7 +17,7 @@ use crate::effect::{Effect, Hooks, Nominal};
 use crate::state::BodyState;
 
 /// The clock of the readings is fast or slow; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TimeBase {
     /// r: above 1 the clock is fast.

@@ -11,6 +11,7 @@
 //! tool does not sink.
 
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
@@ -19,7 +20,7 @@ use crate::sensor::unit;
 use crate::world::Wrench;
 
 /// The hand carries an unknown mass; see the module of the same name for ranges.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WristPayload {
     /// m, kg.

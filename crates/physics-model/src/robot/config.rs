@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use nalgebra::Matrix3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::RobotError;
 
 /// Which arm, and which of its links and joints play which part.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RobotConfig {
     /// Name in tables and folders.
@@ -27,6 +28,7 @@ pub struct RobotConfig {
     /// Revolute or continuous joints that move, base first.
     pub actuated_joints: Vec<String>,
     /// All other moving joints below the base, and where they are held: rad, or m for prismatic ones.
+    #[schemars(extend("x-unit" = "rad or m"))]
     pub locked_joints: BTreeMap<String, f64>,
     /// Joint positions, rad, that a redundant arm tends to.
     pub home_rad: Vec<f64>,

@@ -1,6 +1,6 @@
 //! Errors of arms and of inverse kinematics.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -17,12 +17,12 @@ pub enum RobotError {
         source: std::io::Error,
     },
     /// The file is not URDF.
-    #[error("robot.urdf = {}: cannot be parsed, expected URDF", .path.display())]
+    #[error("robot.urdf = {}: cannot be parsed, expected URDF: {reason}", .path.display())]
     Parse {
         /// File.
         path: PathBuf,
-        /// Cause.
-        source: urdf_rs::UrdfError,
+        /// The parser's words, on one line.
+        reason: String,
     },
     /// A link of the configuration is not in the URDF, or does not descend from the base link.
     #[error("robot.{key} = {name:?}: no such link below the base in {}, expected one of {known}", .path.display())]
@@ -114,4 +114,31 @@ pub enum IkError {
         /// Iterations done.
         iterations: u32,
     },
+}
+
+/// Names of a file in a message.
+pub(super) fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    whole_file::one_line(&names.collect::<Vec<_>>().join(", "), 600)
+}
+
+/// A name of a file in a message.
+pub(super) fn quoted(name: &str) -> String {
+    whole_file::one_line(name, 100)
+}
+
+pub(super) fn unknown_link<'a>(
+    path: &Path,
+    key: &'static str,
+    name: &str,
+    known: impl Iterator<Item = &'a str>,
+) -> RobotError {
+    RobotError::UnknownLink { path: path.into(), key, name: quoted(name), known: listed(known) }
+}
+
+pub(super) fn joint_error(path: &Path, joint: &str, problem: &str) -> RobotError {
+    RobotError::Joint { path: path.into(), joint: quoted(joint), problem: whole_file::one_line(problem, 400) }
+}
+
+pub(super) fn link_error(path: &Path, link: &str, problem: &str) -> RobotError {
+    RobotError::Link { path: path.into(), link: quoted(link), problem: whole_file::one_line(problem, 400) }
 }

@@ -13,6 +13,7 @@ mod chain;
 mod config;
 mod dynamics;
 mod error;
+mod file;
 mod ik;
 mod shapes;
 mod urdf;
@@ -65,7 +66,7 @@ impl Robot {
     /// If the file is missing or no URDF, if a link or joint is missing or unfit for its part, or if a value is impossible.
     pub fn load(config: &RobotConfig, base_dir: &Path) -> Result<Self, RobotError> {
         let path = base_dir.join(&config.urdf);
-        let description = urdf::read(&path)?;
+        let description = file::read(&path)?;
         Self::build(config, description, &path)
     }
 
@@ -84,8 +85,11 @@ impl Robot {
                 return Err(RobotError::Value {
                     robot: config.name.clone(),
                     key: key.into(),
-                    value: format!("{name:?}"),
-                    expected: format!("a link that moves with {:?}", config.actuated_joints.last()),
+                    value: format!("{:?}", whole_file::one_line(name, 100)),
+                    expected: whole_file::one_line(
+                        &format!("a link that moves with {:?}", config.actuated_joints.last()),
+                        200,
+                    ),
                 });
             }
         }
@@ -93,7 +97,7 @@ impl Robot {
         if tool_shapes.is_empty() {
             return Err(RobotError::Link {
                 path: path.into(),
-                link: config.tool_link.clone(),
+                link: whole_file::one_line(&config.tool_link, 100),
                 problem: "nothing that moves with it has a collision shape, expected a tool that can touch".into(),
             });
         }
@@ -193,6 +197,14 @@ impl Robot {
     #[must_use]
     pub fn base_from_link(&self, q: &[f64], frame: FrameId) -> Isometry3<f64> {
         self.place(&self.chain.posture(q), frame).isometry()
+    }
+
+    /// Poses, in the base frame (m), of the frames in which the joints turn (about z), the base's first, at `q` (rad): the arm as a line of
+    /// joints, to be drawn.
+    #[must_use]
+    pub fn base_from_joints(&self, q: &[f64]) -> Vec<Isometry3<f64>> {
+        let posture = self.chain.posture(q);
+        (0..self.joint_count()).map(|index| posture.frame(index).isometry()).collect()
     }
 
     /// Pose of the controlled point in the base frame (m) at `q` (rad).

@@ -31,6 +31,9 @@ pub enum ToolShape {
 /// A sphere counts as the cap of a cylinder's end if its centre is this near, m: the lengths of our capsules are rounded.
 const CAP_TOLERANCE_M: f64 = 2e-4;
 
+/// What is longer, or further away, is no tool, m.
+const LONGEST_M: f64 = 10.0;
+
 struct Ball {
     center: Vector3<f64>,
     radius: f64,
@@ -60,8 +63,12 @@ pub(super) fn link_shapes(link: &urdf_rs::Link, target_from_link: &Frame) -> Res
                 return Err("collision is a box or a mesh, expected sphere, cylinder or capsule on the tool".into());
             }
         };
-        if !(radius > 0.0 && radius.is_finite() && length >= 0.0 && length.is_finite()) {
-            return Err(format!("collision has radius {radius} and length {length}, expected positive numbers"));
+        let placed = target_from_shape.position.iter().all(|v| v.abs() <= LONGEST_M)
+            && target_from_shape.rotation.iter().all(|v| v.is_finite());
+        if !(radius > 0.0 && radius <= LONGEST_M && (0.0..=LONGEST_M).contains(&length) && placed) {
+            return Err(format!(
+                "collision has radius {radius} and length {length}, expected positive numbers within {LONGEST_M} m of the tool"
+            ));
         }
         let end = |side: f64| target_from_shape.point(&Vector3::new(0.0, 0.0, side * length / 2.0));
         match &collision.geometry {

@@ -151,7 +151,7 @@ fn unfit_joints_are_errors() {
 fn impossible_values_are_errors() {
     for (from, to, says) in [
         ("<mass value=\"1\"/>", "<mass value=\"0\"/>", "no mass"),
-        ("<mass value=\"1\"/>", "<mass value=\"-1\"/>", "mass -1 kg, expected at least 0"),
+        ("<mass value=\"1\"/>", "<mass value=\"-1\"/>", "mass -1 kg, expected 0 to 1000000"),
         ("izz=\"0.1\"", "izz=\"-0.1\"", "not positive definite"),
         ("axis xyz=\"0 1 0\"", "axis xyz=\"0 0 0\"", "expected a direction"),
         ("lower=\"-3\"", "lower=\"4\"", "expected lower below upper"),

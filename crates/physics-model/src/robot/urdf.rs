@@ -10,9 +10,15 @@ use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use urdf_rs::JointType;
 
 use super::chain::{Chain, Frame, Inertia, Segment};
+use super::error::{joint_error, link_error, listed, quoted, unknown_link};
 use super::shapes::{ToolShape, link_shapes};
 use super::{JointLimit, RobotConfig, RobotError};
 use crate::state::MAX_JOINTS;
+
+/// No arm is longer, m, heavier, kg, or more inert, kg·m²: beyond it sums and products leave the finite numbers.
+const LONGEST_M: f64 = 1000.0;
+const HEAVIEST_KG: f64 = 1e6;
+const MOST_INERT_KGM2: f64 = 1e9;
 
 /// A link: the segment that carries it (`None`: the base) and its fixed place there.
 #[derive(Clone, Debug)]
@@ -28,12 +34,6 @@ pub(super) struct Arm {
     pub(super) limits: Vec<JointLimit>,
     pub(super) links: BTreeMap<String, Placed>,
     description: urdf_rs::Robot,
-}
-
-/// Reads a file.
-pub(super) fn read(path: &Path) -> Result<urdf_rs::Robot, RobotError> {
-    let text = std::fs::read_to_string(path).map_err(|source| RobotError::Read { path: path.into(), source })?;
-    urdf_rs::read_from_string(&text).map_err(|source| RobotError::Parse { path: path.into(), source })
 }
 
 impl Arm {
@@ -58,7 +58,7 @@ impl Arm {
                     format!("does not move with {:?}, expected a serial chain", config.actuated_joints[last])
                 }
             };
-            return Err(joint_error(path, missing, problem));
+            return Err(joint_error(path, missing, &problem));
         }
         let Walk { links, mut segments, limits, .. } = arm;
         for link in &description.links {
@@ -71,7 +71,7 @@ impl Arm {
         }
         for (segment, joint) in segments.iter().zip(&config.actuated_joints) {
             if segment.inertia.mass_kg <= 0.0 {
-                return Err(joint_error(path, joint, "the links that it carries have no mass, expected some".into()));
+                return Err(joint_error(path, joint, "the links that it carries have no mass, expected some"));
             }
         }
         Ok(Self { chain: Chain { segments }, limits, links, description })
@@ -91,7 +91,8 @@ impl Arm {
                 continue;
             };
             let tool_from_link = tool_from_segment.then(&placed.segment_from_link);
-            shapes.extend(link_shapes(link, &tool_from_link).map_err(|problem| link_error(path, &link.name, problem))?);
+            shapes
+                .extend(link_shapes(link, &tool_from_link).map_err(|problem| link_error(path, &link.name, &problem))?);
         }
         Ok(shapes)
     }
@@ -111,13 +112,15 @@ impl<'a> Walk<'a> {
     fn visit(&mut self, link: &str, segment: Option<usize>, segment_from_link: &Frame) -> Result<(), RobotError> {
         let placed = Placed { segment, segment_from_link: *segment_from_link };
         if self.links.insert(link.to_owned(), placed).is_some() {
-            return Err(link_error(self.path, link, "has two parents, expected a tree".into()));
+            return Err(link_error(self.path, link, "has two parents, expected a tree"));
         }
         let children: Vec<&'a urdf_rs::Joint> = self.children.get(link).cloned().unwrap_or_default();
         for joint in children {
             let origin = Frame::from_xyz_rpy(joint.origin.xyz.0, joint.origin.rpy.0);
-            if !origin.position.iter().chain(origin.rotation.iter()).all(|v| v.is_finite()) {
-                return Err(joint_error(self.path, &joint.name, "origin is not finite".into()));
+            if !believable(&origin) {
+                let problem =
+                    format!("origin is {:?}, expected finite values within {LONGEST_M} m", joint.origin.xyz.0);
+                return Err(joint_error(self.path, &joint.name, &problem));
             }
             let segment_from_joint = segment_from_link.then(&origin);
             if let Some(index) = self.config.actuated_joints.iter().position(|name| *name == joint.name) {
@@ -126,7 +129,7 @@ impl<'a> Walk<'a> {
                         "comes after {:?} in robot.actuated_joints but does not move with it, expected a serial chain in order",
                         index.checked_sub(1).map_or("the base", |i| self.config.actuated_joints[i].as_str())
                     );
-                    return Err(joint_error(self.path, &joint.name, problem));
+                    return Err(joint_error(self.path, &joint.name, &problem));
                 }
                 let turn = joint_from_axis(&unit_axis(joint, self.path)?);
                 self.limits.push(limit(joint, self.path)?);
@@ -151,16 +154,16 @@ fn joint_table<'a>(
     let mut parents = BTreeMap::new();
     for joint in &description.joints {
         if joints.insert(joint.name.as_str(), joint).is_some() {
-            return Err(joint_error(path, &joint.name, "occurs twice, expected unique names".into()));
+            return Err(joint_error(path, &joint.name, "occurs twice, expected unique names"));
         }
         for link in [&joint.parent.link, &joint.child.link] {
             if !description.links.iter().any(|l| l.name == *link) {
-                return Err(joint_error(path, &joint.name, format!("connects link {link:?}, which does not exist")));
+                return Err(joint_error(path, &joint.name, &format!("connects link {link:?}, which does not exist")));
             }
         }
         if let Some(other) = parents.insert(joint.child.link.as_str(), joint.name.as_str()) {
             let problem = format!("has two parent joints, {other:?} and {:?}, expected a tree", joint.name);
-            return Err(link_error(path, &joint.child.link, problem));
+            return Err(link_error(path, &joint.child.link, &problem));
         }
     }
     Ok(joints)
@@ -172,11 +175,11 @@ fn check_names(config: &RobotConfig, joints: &BTreeMap<&str, &urdf_rs::Joint>, p
     for (key, name) in actuated.chain(locked) {
         if !joints.contains_key(name.as_str()) {
             let moving = joints.values().filter(|j| j.joint_type != JointType::Fixed).map(|j| j.name.as_str());
-            let known = moving.collect::<Vec<_>>().join(", ");
-            return Err(RobotError::UnknownJoint { path: path.into(), key, name: name.clone(), known });
+            let known = listed(moving);
+            return Err(RobotError::UnknownJoint { path: path.into(), key, name: quoted(name), known });
         }
         if key == "actuated_joints" && config.locked_joints.contains_key(name) {
-            return Err(joint_error(path, name, "is in robot.actuated_joints and in robot.locked_joints".into()));
+            return Err(joint_error(path, name, "is in robot.actuated_joints and in robot.locked_joints"));
         }
     }
     let count = config.actuated_joints.len();
@@ -199,21 +202,22 @@ fn frozen(joint: &urdf_rs::Joint, locked: Option<&f64>, path: &Path) -> Result<F
         (JointType::Revolute | JointType::Continuous | JointType::Prismatic, Some(position)) => *position,
         (kind, Some(_)) => {
             let problem = format!("is {kind:?}, expected revolute, continuous or prismatic in robot.locked_joints");
-            return Err(joint_error(path, &joint.name, problem));
+            return Err(joint_error(path, &joint.name, &problem));
         }
         (kind, None) => {
             let problem =
                 format!("is {kind:?}, expected it in robot.actuated_joints, or in robot.locked_joints with a value");
-            return Err(joint_error(path, &joint.name, problem));
+            return Err(joint_error(path, &joint.name, &problem));
         }
     };
     let (lower, upper) = match joint.joint_type {
         JointType::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
         _ => (joint.limit.lower, joint.limit.upper),
     };
-    if !(position.is_finite() && (lower..=upper).contains(&position)) {
+    let most = if joint.joint_type == JointType::Prismatic { LONGEST_M } else { f64::MAX };
+    if !(position.abs() <= most && (lower..=upper).contains(&position)) {
         let problem = format!("is locked at {position}, expected {lower} to {upper}");
-        return Err(joint_error(path, &joint.name, problem));
+        return Err(joint_error(path, &joint.name, &problem));
     }
     let axis = unit_axis(joint, path)?;
     Ok(if joint.joint_type == JointType::Prismatic {
@@ -237,8 +241,9 @@ fn joint_from_axis(axis: &Unit<Vector3<f64>>) -> Frame {
 fn unit_axis(joint: &urdf_rs::Joint, path: &Path) -> Result<Unit<Vector3<f64>>, RobotError> {
     let axis = Vector3::from(joint.axis.xyz.0);
     Unit::try_new(axis, 1e-6)
-        .filter(|unit| unit.iter().all(|v| v.is_finite()))
-        .ok_or_else(|| joint_error(path, &joint.name, format!("axis is {:?}, expected a direction", joint.axis.xyz.0)))
+        // An overflow of the norm leaves nothing of the direction.
+        .filter(|unit| (unit.norm() - 1.0).abs() < 1e-6)
+        .ok_or_else(|| joint_error(path, &joint.name, &format!("axis is {:?}, expected a direction", joint.axis.xyz.0)))
 }
 
 fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> {
@@ -248,7 +253,7 @@ fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> 
         _ => {
             let problem =
                 format!("is {:?}, expected revolute or continuous in robot.actuated_joints", joint.joint_type);
-            return Err(joint_error(path, &joint.name, problem));
+            return Err(joint_error(path, &joint.name, &problem));
         }
     };
     let (velocity_rps, effort_nm) = (joint.limit.velocity, joint.limit.effort);
@@ -256,7 +261,7 @@ fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> 
         let problem = format!(
             "limit is {lower_rad} to {upper_rad} rad, {velocity_rps} rad/s, {effort_nm} N m; expected lower below upper, others at least 0"
         );
-        return Err(joint_error(path, &joint.name, problem));
+        return Err(joint_error(path, &joint.name, &problem));
     }
     Ok(JointLimit { lower_rad, upper_rad, velocity_rps, effort_nm })
 }
@@ -265,26 +270,20 @@ fn inertia(link: &urdf_rs::Link, path: &Path) -> Result<Inertia, RobotError> {
     let (mass_kg, i) = (link.inertial.mass.value, &link.inertial.inertia);
     let origin = Frame::from_xyz_rpy(link.inertial.origin.xyz.0, link.inertial.origin.rpy.0);
     let moment = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
-    let finite = moment.iter().chain(origin.position.iter()).chain(origin.rotation.iter()).all(|v| v.is_finite());
-    if !(mass_kg.is_finite() && mass_kg >= 0.0 && finite) {
-        let problem = format!("inertial has mass {mass_kg} kg, expected at least 0, and finite values");
-        return Err(link_error(path, &link.name, problem));
+    let inert = moment.iter().all(|v| v.abs() <= MOST_INERT_KGM2);
+    if !((0.0..=HEAVIEST_KG).contains(&mass_kg) && inert && believable(&origin)) {
+        let problem = format!(
+            "inertial has mass {mass_kg} kg, expected 0 to {HEAVIEST_KG}, an origin within {LONGEST_M} m and inertia within {MOST_INERT_KGM2} kg m²"
+        );
+        return Err(link_error(path, &link.name, &problem));
     }
     if mass_kg > 0.0 && moment.symmetric_eigenvalues().min() <= 0.0 {
-        return Err(link_error(path, &link.name, "inertia is not positive definite, expected it to be".into()));
+        return Err(link_error(path, &link.name, "inertia is not positive definite, expected it to be"));
     }
     Ok(Inertia { mass_kg, com: Vector3::zeros(), moment }.moved(&origin))
 }
 
-fn unknown_link<'a>(path: &Path, key: &'static str, name: &str, known: impl Iterator<Item = &'a str>) -> RobotError {
-    let known = known.collect::<Vec<_>>().join(", ");
-    RobotError::UnknownLink { path: path.into(), key, name: name.into(), known }
-}
-
-fn joint_error(path: &Path, joint: &str, problem: String) -> RobotError {
-    RobotError::Joint { path: path.into(), joint: joint.into(), problem }
-}
-
-fn link_error(path: &Path, link: &str, problem: String) -> RobotError {
-    RobotError::Link { path: path.into(), link: link.into(), problem }
+/// Whether an origin is one of a thing that exists.
+fn believable(origin: &Frame) -> bool {
+    origin.position.iter().all(|v| v.abs() <= LONGEST_M) && origin.rotation.iter().all(|v| v.is_finite())
 }

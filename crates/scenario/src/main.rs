@@ -1,0 +1,133 @@
+//! `cargo xtask scenario`: explains scenario files, and describes their format to editors.
+
+mod table;
+
+use std::io::IsTerminal as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Result, anyhow};
+use clap::{Parser, Subcommand};
+use scenario::{Explanation, FileKind, Problem, Scenario, Selection, file_schema, find_root};
+
+/// Explains scenario files, and describes their format to editors.
+#[derive(Debug, Parser)]
+#[command(name = "scenario", version)]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// Resolves a scenario, checks it with its arm, and lists every key: value, unit, meaning, and the layer that says so.
+    Check(Check),
+    /// Prints the JSON Schema of scenario files, for editors that complete and check TOML; assets/schemas/ holds the same.
+    #[command(
+        after_help = "In an editor with taplo (\"Even Better TOML\"), the first line of a file in scenarios/ can name it:\n  \
+        #:schema ../assets/schemas/scenario.json"
+    )]
+    Schema {
+        /// The schema of robot files (scenarios/robots/) in place of that of all other layers.
+        #[arg(long)]
+        robot: bool,
+    },
+}
+
+#[derive(Debug, clap::Args)]
+struct Check {
+    /// Domain, a name in scenarios/ or a file; a resolved scenario.toml of a run too.
+    #[arg(value_name = "FILE|DOMAIN")]
+    domain: String,
+    /// Arm: sawyer, jaco, or a file.
+    #[arg(long, default_value = "sawyer")]
+    robot: String,
+    /// Preset: paper, surmise, or a file.
+    #[arg(long, default_value = "paper")]
+    preset: String,
+    /// With the layer that --quick lays over a preset.
+    #[arg(long)]
+    quick: bool,
+    /// A model.toml of diagnose: its effects become those of the planner's model.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Overrides a scenario entry: key=value.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Lists only keys that begin with this: planner, task.reward, distribution.object.
+    #[arg(long, value_name = "PREFIX")]
+    only: Option<String>,
+    /// Prints one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    let result = match Arguments::parse().task {
+        Task::Check(check) => run(&check),
+        Task::Schema { robot } => {
+            let kind = if robot { FileKind::Robot } else { FileKind::Scenario };
+            Ok(format!("{:#}\n", file_schema(kind)))
+        }
+    };
+    match result {
+        Ok(text) => match whole_file::print(&text) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                whole_file::say(&format!("error: cannot print: {error}"));
+                ExitCode::FAILURE
+            }
+        },
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(check: &Check) -> Result<String> {
+    let root = match &check.root {
+        Some(root) => root.clone(),
+        None => find_root(&std::env::current_dir()?)?,
+    };
+    let selection = Selection {
+        root: root.clone(),
+        domain: check.domain.clone(),
+        robot: check.robot.clone(),
+        preset: check.preset.clone(),
+        quick: check.quick,
+        set: check.set.clone(),
+        effects: check.model.clone(),
+    };
+    let (scenario, mut explanations) = selection.explain()?;
+    // The arm, and whether it reaches its start.
+    Problem::assemble(&scenario, &root)?;
+    if let Some(prefix) = &check.only {
+        explanations.retain(|explanation| explanation.key.starts_with(prefix.as_str()));
+        if explanations.is_empty() {
+            return Err(anyhow!("--only {prefix}: expected the beginning of a key, no key of this scenario has it"));
+        }
+    }
+    Ok(if check.json { json(&scenario, &explanations) } else { text(&scenario, &explanations) })
+}
+
+fn json(scenario: &Scenario, explanations: &[Explanation]) -> String {
+    let report = serde_json::json!({
+        "scenario": scenario.name,
+        "robot": scenario.robot.name,
+        "preset": scenario.preset,
+        "hash": scenario.hash(),
+        "keys": explanations,
+    });
+    format!("{report:#}\n")
+}
+
+fn text(scenario: &Scenario, explanations: &[Explanation]) -> String {
+    let width = terminal_size::terminal_size().filter(|_| std::io::stdout().is_terminal());
+    let table = table::render(explanations, width.map(|(terminal_size::Width(columns), _)| usize::from(columns)));
+    let Scenario { name, preset, robot, .. } = scenario;
+    format!("{table}\n{name} for {} with preset {preset} is good: {} keys\n", robot.name, explanations.len())
+}
