@@ -5,7 +5,7 @@ use crate::files::{self, FileRef};
 use crate::inference::Inference;
 use crate::normalise::Normalisation;
 use crate::parameters::{Dimensions, NetworkConfig, Parameters};
-use crate::train::{EpochReport, TrainConfig};
+use crate::settings::{EpochReport, TrainConfig};
 use crate::{Error, Layout};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -111,13 +111,19 @@ impl Checkpoint {
         if let Some(expected) = expected {
             manifest.layout.check(expected, &path)?;
         }
-        let dimensions = Dimensions::new(&manifest.network, &manifest.layout)?;
+        let dimensions = Dimensions::new(&manifest.network, &manifest.layout).map_err(|error| Error::Format {
+            path: path.clone(),
+            reason: whole_file::one_line(&error.to_string(), 400),
+        })?;
         let scales = (manifest.normalisation.observation.len(), manifest.normalisation.continuous.len());
         if scales != (dimensions.observations, dimensions.continuous) {
             let reason = format!("{} and {} scales do not fit the layout", scales.0, scales.1);
             return Err(Error::Format { path, reason });
         }
         let refuse = |reason: String| Err(Error::Format { path: path.clone(), reason });
+        if let Some(reason) = manifest.layout.problem() {
+            return refuse(reason);
+        }
         let normalisation = &manifest.normalisation;
         let mut scales = normalisation.observation.iter().chain(&normalisation.continuous);
         if let Some(scale) = scales.find(|scale| !scale.is_usable()) {
@@ -163,7 +169,7 @@ impl Checkpoint {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "training"))]
 mod tests {
     use super::*;
     use crate::train::Trainer;
@@ -212,22 +218,35 @@ mod tests {
         // Numbers that JSON can hold and a network cannot use.
         let manifest: serde_json::Value = serde_json::from_str(&text).unwrap();
         type Case = (&'static str, serde_json::Value, &'static str);
-        let edits: [Case; 6] = [
+        let edits: [Case; 10] = [
             ("/normalisation/continuous/0/stddev", 0.0.into(), "stddev above 0"),
             ("/normalisation/observation/1/stddev", (-1.0).into(), "stddev above 0"),
             ("/baseline/structures", serde_json::json!([0.5]), "structures and the targets of the layout"),
             ("/baseline/continuous", serde_json::json!([]), "structures and the targets of the layout"),
             ("/baseline/labels", serde_json::json!([3, 99]), "structures and the targets of the layout"),
             ("/network/hidden/0", (1_u64 << 62).into(), "at most 65536 each"),
+            ("/layout/transforms", serde_json::json!(["identity"]), "1 transforms for 2 continuous targets"),
+            (
+                "/layout/transforms/0",
+                serde_json::json!({"minus_observation": 3}),
+                "observation 3, expected one of 0 to 2",
+            ),
+            ("/weights/name", "../weights".into(), "names the file `../weights`"),
+            ("/weights/name", "/dev/zero".into(), "names the file `/dev/zero`"),
         ];
         for (pointer, value, expected) in edits {
             let mut edited = manifest.clone();
             *edited.pointer_mut(pointer).unwrap() = value;
             fs::write(&json, edited.to_string()).unwrap();
-            let message = load();
+            // A layout of its own is compared with no other.
+            let message = Checkpoint::load(dir.path(), None).unwrap_err().to_string();
             assert!(message.contains(expected), "{pointer}: {message}");
         }
 
+        fs::write(&json, text.replacen("\"layout\"", "\"lay\\nout\"", 1)).unwrap();
+        let error = Checkpoint::load(dir.path(), None).unwrap_err();
+        let cause = std::error::Error::source(&error).unwrap().to_string();
+        assert!(cause.contains("lay out") && !cause.contains(char::is_control), "{cause}");
         fs::write(&json, &text[..text.len() / 2]).unwrap();
         let message = load();
         assert!(message.ends_with("prior.json: not a readable prior file (truncated or edited?)"), "{message}");

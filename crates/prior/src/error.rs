@@ -2,6 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+/// The words of a parser, on one line.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct Reason(pub(crate) String);
+
+impl From<serde_json::Error> for Reason {
+    fn from(error: serde_json::Error) -> Self {
+        Self(whole_file::one_line(&error.to_string(), 400))
+    }
+}
+
 /// An error of the `prior` crate.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -48,7 +59,7 @@ pub enum Error {
         kind: &'static str,
         /// Cause.
         #[source]
-        source: serde_json::Error,
+        source: Reason,
     },
     /// A file of another format version.
     #[error("{}: format version {found}, but this program reads version {expected}", path.display())]
@@ -92,8 +103,8 @@ pub enum Error {
         /// Shape expected.
         expected: String,
     },
-    /// A weights file that is not safetensors.
-    #[error("{}: not a safetensors file: {reason}", path.display())]
+    /// A prior that contradicts itself, or a weights file that is not safetensors.
+    #[error("{}: not usable as a prior: {reason}", path.display())]
     Format {
         /// File.
         path: PathBuf,

@@ -21,6 +21,11 @@ pub struct FileRef {
     pub blake3: String,
 }
 
+/// Size of a JSON file.
+const MOST_JSON_BYTES: u64 = 64 << 20;
+/// Size of a binary file.
+const MOST_BLOB_BYTES: u64 = 4 << 30;
+
 /// The one field that is read before all others.
 #[derive(Deserialize)]
 struct Versioned {
@@ -37,16 +42,27 @@ pub(crate) fn write_blob(dir: &Path, prefix: &str, extension: &str, bytes: &[u8]
 
 /// Reads a binary file back, refusing another length or content.
 pub(crate) fn read_blob(dir: &Path, file: &FileRef) -> Result<Vec<u8>, Error> {
+    // A name that is a path would have any file read.
+    let plain = file.name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c));
+    if !plain || !file.name.starts_with(|c: char| c.is_ascii_alphanumeric()) || file.name.len() > 100 {
+        let name = whole_file::one_line(&file.name, 100);
+        let reason = format!("names the file `{name}`, expected letters, digits, `-`, `_`, `.`");
+        return Err(Error::Format { path: dir.to_path_buf(), reason });
+    }
     let path = dir.join(&file.name);
-    let bytes = std::fs::read(&path).map_err(Error::io(&path, "read"))?;
+    let bytes = read(&path, MOST_BLOB_BYTES)?;
     if bytes.len() as u64 != file.bytes {
         return Err(Error::Length { path, found: bytes.len() as u64, expected: file.bytes });
     }
     let found = blake3::hash(&bytes).to_hex().to_string();
     if found != file.blake3 {
-        return Err(Error::Hash { path, found, expected: file.blake3.clone() });
+        return Err(Error::Hash { path, found, expected: whole_file::one_line(&file.blake3, 64) });
     }
     Ok(bytes)
+}
+
+fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>, Error> {
+    whole_file::read(path, most_bytes).map_err(|e| Error::io(&e.path, e.action)(e.source))
 }
 
 /// Renames the JSON file into place, then removes the binaries with these prefixes that it does not name.
@@ -55,7 +71,7 @@ pub(crate) fn commit(dir: &Path, name: &str, value: &impl Serialize, sets: &[(&s
     let mut text = serde_json::to_vec_pretty(value).map_err(|source| Error::Json {
         path: path.clone(),
         kind: "writable",
-        source,
+        source: source.into(),
     })?;
     text.push(b'\n');
     write(dir, name, &text)?;
@@ -74,8 +90,8 @@ pub(crate) fn commit(dir: &Path, name: &str, value: &impl Serialize, sets: &[(&s
 
 /// Reads a JSON file of `version`; the version is looked at before anything else.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path, kind: &'static str, version: u64) -> Result<T, Error> {
-    let text = std::fs::read(path).map_err(Error::io(path, "read"))?;
-    let refuse = |source| Error::Json { path: path.to_path_buf(), kind, source };
+    let text = read(path, MOST_JSON_BYTES)?;
+    let refuse = |source: serde_json::Error| Error::Json { path: path.to_path_buf(), kind, source: source.into() };
     let found = serde_json::from_slice::<Versioned>(&text).map_err(refuse)?.version;
     if found != version {
         return Err(Error::Version { path: path.to_path_buf(), found, expected: version });
@@ -119,7 +135,7 @@ pub(crate) fn to_safetensors(parameters: &Parameters<f32>, specs: &[TensorSpec])
 
 /// Reads the tensors of `specs` from safetensors; `path` is for messages.
 pub(crate) fn from_safetensors(bytes: &[u8], specs: &[TensorSpec], path: &Path) -> Result<Parameters<f32>, Error> {
-    let refuse = |reason: &str| Error::Format { path: path.to_path_buf(), reason: reason.into() };
+    let refuse = |reason: &str| Error::Format { path: path.to_path_buf(), reason: whole_file::one_line(reason, 400) };
     let (length, rest) = bytes.split_first_chunk::<8>().ok_or_else(|| refuse("shorter than its first field"))?;
     let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| refuse("header too long"))?;
     let (header, data) = rest.split_at_checked(length).ok_or_else(|| refuse("shorter than its header"))?;
@@ -129,7 +145,7 @@ pub(crate) fn from_safetensors(bytes: &[u8], specs: &[TensorSpec], path: &Path) 
         let mismatch = |found: String| Error::Tensor {
             path: path.to_path_buf(),
             tensor: spec.name.clone(),
-            found,
+            found: whole_file::one_line(&found, 100),
             expected: expected.clone(),
         };
         let entry = header.get(&spec.name).ok_or_else(|| mismatch("missing".into()))?;

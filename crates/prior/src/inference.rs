@@ -238,7 +238,7 @@ fn log_softmax(logits: &[f32], target: &mut [f64]) {
     target.iter_mut().zip(logits).for_each(|(target, &logit)| *target = f64::from(logit) - shift);
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "training"))]
 mod tests {
     use super::*;
     use crate::Sequence;

@@ -72,6 +72,21 @@ impl Layout {
         each.map(|(value, transform)| transform.invert(*value, observation)).collect()
     }
 
+    /// Whether its parts belong together: a transform for each continuous target, of an observation that there is; otherwise the reason.
+    pub(crate) fn problem(&self) -> Option<String> {
+        let (transforms, targets) = (self.transforms.len(), self.continuous.len());
+        if transforms != targets {
+            return Some(format!("layout has {transforms} transforms for {targets} continuous targets"));
+        }
+        let columns = self.observation.len();
+        self.transforms.iter().find_map(|transform| match transform {
+            Transform::MinusObservation(column) if *column >= columns => {
+                Some(format!("layout has a transform with observation {column}, expected one of 0 to {}", columns - 1))
+            }
+            _ => None,
+        })
+    }
+
     /// Refuses `self`, read from `path`, unless it equals `expected`.
     ///
     /// # Errors
@@ -79,7 +94,7 @@ impl Layout {
     /// [`Error::Robot`] for another arm, else [`Error::Layout`] with the first difference.
     pub fn check(&self, expected: &Self, path: &Path) -> Result<(), Error> {
         if self.robot != expected.robot {
-            let (found, expected) = (self.robot.clone(), expected.robot.clone());
+            let (found, expected) = (whole_file::one_line(&self.robot, 100), expected.robot.clone());
             return Err(Error::Robot { path: path.to_path_buf(), found, expected });
         }
         let transforms = |layout: &Self| layout.transforms.iter().map(|t| format!("{t:?}")).collect::<Vec<_>>();
@@ -94,7 +109,9 @@ impl Layout {
         ];
         for (part, found, expected) in parts {
             if let Some(index) = (0..found.len().max(expected.len())).find(|&i| found.get(i) != expected.get(i)) {
-                let quote = |names: &[String]| names.get(index).map_or("absent".into(), |name| format!("`{name}`"));
+                let quote = |names: &[String]| {
+                    names.get(index).map_or("absent".into(), |name| format!("`{}`", whole_file::one_line(name, 200)))
+                };
                 let (found, expected) = (quote(&found), quote(&expected));
                 return Err(Error::Layout { path: path.to_path_buf(), part, index, found, expected });
             }

@@ -82,11 +82,14 @@ pub mod fused;
 pub mod inference;
 pub mod layout;
 pub mod mixture;
+#[cfg(feature = "training")]
 pub mod network;
 pub mod normalise;
 pub mod parameters;
 pub mod pictures;
+pub mod settings;
 pub mod suggest;
+#[cfg(feature = "training")]
 pub mod train;
 
 pub use calibrate::{Baseline, Calibration, Episode, Models, calibrate};
@@ -98,9 +101,11 @@ pub use layout::{ClassTarget, Layout, Sequence, Transform};
 pub use mixture::{Draw, Mixture};
 pub use normalise::Normalisation;
 pub use parameters::{Dimensions, NetworkConfig, Parameters};
+pub use settings::{EpochReport, GradientPath, Schedule, TrainConfig};
 pub use suggest::Suggester;
 
-pub use train::{EpochReport, GradientPath, Schedule, TrainConfig, Trainer, curve_csv, is_held_out};
+#[cfg(feature = "training")]
+pub use train::{Trainer, curve_csv, is_held_out};
 
 /// The prior that a program takes for `robot` unless told otherwise: the one trained here (with `quick` one of a quick training first), else
 /// the shipped one.

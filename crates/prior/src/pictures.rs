@@ -6,7 +6,7 @@ use figures::{
 use statrs::distribution::{Binomial, DiscreteCDF as _};
 
 use crate::calibrate::{Calibration, Likelihoods, ParameterReport, Score};
-use crate::train::EpochReport;
+use crate::settings::EpochReport;
 
 /// Negative log-likelihood by epoch.
 #[must_use]

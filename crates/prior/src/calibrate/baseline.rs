@@ -69,7 +69,8 @@ impl Baseline {
     /// Whether it belongs to `layout` and has densities; otherwise the reason why not.
     pub(crate) fn check(&self, layout: &Layout) -> Result<(), String> {
         let labels: Vec<usize> = layout.classes.iter().map(|target| target.labels.len()).collect();
-        let structures: usize = labels.iter().product();
+        // None where there are more than could ever be listed.
+        let structures = labels.iter().try_fold(1_usize, |product, count| product.checked_mul(*count)).unwrap_or(0);
         let shape = (self.labels == labels, self.structures.len(), self.continuous.len());
         if shape != (true, structures, structures) || self.continuous.iter().any(|c| c.len() != layout.continuous.len())
         {

@@ -1,5 +1,6 @@
 use super::*;
 use crate::Inference;
+use crate::NetworkConfig;
 use crate::layout::tests::layout;
 use pomdp::Rng;
 use rand::RngExt as _;
