@@ -3,13 +3,13 @@
 use belief::Particles;
 use physics_model::effect::unknown::{log_density as log_density_of_effects, sample as sample_effects};
 use physics_model::{Action, GoalPolicy, HeuristicPolicy, Observation, Particle, PushModel};
-use planner::Pomcp;
+use planner::{Pomcp, SearchReport};
 use pomdp::{Discretise as _, Outcome, Policy, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
 use prior::Suggester;
 use scenario::{Filter, Problem, Rollouts, Tracker, with_known_joints};
 
 use crate::births::with_births;
-use crate::{BeliefErrors, Episode, Error, Method, Reason, StepRecord, World};
+use crate::{BeliefErrors, Episode, Error, Glimpse, Method, Reason, StepRecord, Watcher, World};
 
 /// Attempts at drawing one possible suggestion.
 const DRAWS_PER_PROPOSAL: usize = 10;
@@ -33,9 +33,17 @@ enum Mind<'a> {
 }
 
 impl Mind<'_> {
+    /// The belief, where there is one.
+    fn belief(&self) -> Option<&Particles<Particle>> {
+        match self {
+            Self::Belief(_, particles, _) => Some(particles),
+            Self::Heuristic | Self::Oracle(_) => None,
+        }
+    }
+
     /// Keeps how far the belief is from the world's truth, where there are both.
     fn note_errors(&self, world: &dyn World, errors: &mut BeliefErrors) {
-        if let (Self::Belief(_, particles, _), Some(truth)) = (self, world.truth()) {
+        if let (Some(particles), Some(truth)) = (self.belief(), world.truth()) {
             errors.push(particles, truth);
         }
     }
@@ -77,6 +85,20 @@ impl<'a> Agent<'a> {
     /// Where the scenario and the first observation contradict each other. Depletion and a world that fails are no errors: they end the
     /// episode.
     pub fn run(&mut self, world: &mut dyn World, seed: Seed) -> Result<Episode, Error> {
+        self.run_watched(world, seed, &mut ())
+    }
+
+    /// The same before the eyes of a watcher, which changes nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::run`].
+    pub fn run_watched(
+        &mut self,
+        world: &mut dyn World,
+        seed: Seed,
+        watcher: &mut dyn Watcher,
+    ) -> Result<Episode, Error> {
         let horizon = self.problem.scenario.task.horizon;
         let model = &self.problem.model;
         let mut streams = Streams {
@@ -95,13 +117,21 @@ impl<'a> Agent<'a> {
         let mut mind = self.first_mind(&observation, seed)?;
         let mut belief_errors = BeliefErrors::default();
         mind.note_errors(world, &mut belief_errors);
+        watcher.see(&Glimpse {
+            joints_rad: &joints_rad,
+            truth: world.truth(),
+            belief: mind.belief(),
+            search: None,
+            step: None,
+        });
         let mut object_moved = false;
         let mut steps: Vec<StepRecord> = Vec::new();
         let mut depletions = 0;
         let mut reason = Reason::Horizon;
         let mut failure = None;
         for time in 0..horizon {
-            let mut record = self.decide(&mut mind, world, &observation, &joints_rad, horizon - time, &mut streams)?;
+            let (mut record, search) =
+                self.decide(&mut mind, world, &observation, &joints_rad, horizon - time, &mut streams)?;
             let answer = match world.act(record.action) {
                 Err(Error::World(error)) => {
                     (reason, failure) = (Reason::WorldFailed, Some(sentence(&error)));
@@ -119,13 +149,18 @@ impl<'a> Agent<'a> {
                 Outcome::Diverged => reason = Reason::Diverged,
                 Outcome::Continue => {}
             }
+            let search = search.as_ref();
             if answer.outcome != Outcome::Continue {
+                let truth = world.truth();
+                watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief: None, search, step: Some(&record) });
                 steps.push(record);
                 break;
             }
             let context = Context { model, observation: &observation, joints_rad: &joints_rad, object_moved };
             let Some(next) = self.learn(mind, &mut record, &context, &mut streams)? else {
                 depletions += 1;
+                let truth = world.truth();
+                watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief: None, search, step: Some(&record) });
                 steps.push(record);
                 reason = Reason::Depleted;
                 break;
@@ -133,6 +168,8 @@ impl<'a> Agent<'a> {
             mind = next;
             mind.note_errors(world, &mut belief_errors);
             depletions += usize::from(record.update.as_ref().is_some_and(|u| u.acceptance == 0.0 || u.recoveries > 0));
+            let (truth, belief) = (world.truth(), mind.belief());
+            watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief, search, step: Some(&record) });
             tracing::debug!(
                 time,
                 action = record.action.index(),
@@ -237,7 +274,7 @@ impl<'a> Agent<'a> {
         joints_rad: &[f64],
         remaining: usize,
         streams: &mut Streams,
-    ) -> Result<StepRecord, Error> {
+    ) -> Result<(StepRecord, Option<SearchReport<Action>>), Error> {
         let model = &self.problem.model;
         let policy: &(dyn Policy<PushModel> + Sync) = match self.problem.scenario.agent.rollouts {
             Rollouts::Heuristic => &HeuristicPolicy,
@@ -255,14 +292,14 @@ impl<'a> Agent<'a> {
             }
         };
         let reused = searched.as_ref().map_or(0, |report| report.reused);
-        let (action, value, simulations, transitions) = match searched {
+        let (action, value, simulations, transitions) = match &searched {
             Some(report) => {
                 let value = report.actions[report.action.index()].value;
                 (report.action, Some(value), report.simulations, report.transitions)
             }
             None => (self.heuristic_action(observation, joints_rad), None, 0, 0),
         };
-        Ok(StepRecord {
+        let record = StepRecord {
             action,
             observation: Observation(Vec::new()),
             reward: 0.0,
@@ -275,7 +312,8 @@ impl<'a> Agent<'a> {
             large_force: false,
             out_of_reach: false,
             obstacle_touched: false,
-        })
+        };
+        Ok((record, searched))
     }
 
     /// The heuristic policy knows the tool (from the arm) and the object's centre (measured), nothing else.
@@ -342,150 +380,4 @@ fn obstacle_share(particles: &Particles<Particle>) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::path::Path;
-
-    use physics_model::ObjectShape;
-    use pomdp::{Outcome, Updater as _};
-    use scenario::{Selection, find_root};
-
-    use super::*;
-    use crate::{SimulatedWorld, WorldStep};
-
-    fn problem(domain: &str, set: &[&str]) -> (Problem, Suggester) {
-        let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
-        let set = set.iter().map(ToString::to_string).collect();
-        let selection = Selection { domain: domain.into(), quick: true, set, ..Selection::new(&root) };
-        let problem = Problem::assemble(&selection.load().unwrap(), &root).unwrap();
-        let prior = Suggester::load(&root.join("assets/priors/sawyer"), "sawyer", &problem.model).unwrap();
-        (problem, prior)
-    }
-
-    fn world(problem: &Problem, seed: Seed) -> SimulatedWorld<'_> {
-        let start = problem.sample_world(&mut seed.stream(Purpose::World, 0)).unwrap();
-        SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0))
-    }
-
-    /// The shipped prior after three moves towards the object.
-    fn after_three_moves(problem: &Problem, prior: &mut Suggester) -> WorldStep {
-        let mut world = world(problem, Seed(2));
-        prior.reset();
-        prior.suggest(None, &world.reset().unwrap().0);
-        let push = Action::ALL[2];
-        let mut last = world.act(push).unwrap();
-        prior.suggest(Some(&push), &last.observation);
-        for _ in 0..2 {
-            last = world.act(push).unwrap();
-            prior.suggest(Some(&push), &last.observation);
-        }
-        last
-    }
-
-    #[test]
-    fn suggestions_are_possible_worlds_that_agree_with_the_measurement() {
-        let (problem, mut prior) = problem("D4", &[]);
-        let last = after_three_moves(&problem, &mut prior);
-        let model = &problem.model;
-        let context =
-            Context { model, observation: &last.observation, joints_rad: &last.joints_rad, object_moved: true };
-        let mut rng = Seed(1).stream(Purpose::Test, 0);
-        let sampled = suggest(&prior, Method::RnnSampling, &context, 40, &mut rng);
-        assert_eq!(sampled.len(), 40);
-        let measured = last.observation.object_pose().0;
-        let mut off_m = Vec::new();
-        for particle in &sampled {
-            assert!(model.check(particle).is_ok() && model.agrees(particle, &last.observation));
-            assert_eq!(particle.state.joints_rad, last.joints_rad);
-            assert!(particle.object_moved);
-            let p = particle.state.object.position_m;
-            off_m.push((p[0] - measured[0]).hypot(p[1] - measured[1]));
-        }
-        off_m.sort_by(f64::total_cmp);
-        // Measured to 2 mm; among the draws of one episode 3 mm in the median.
-        assert!(off_m[20] < 0.006, "{} m off in the median", off_m[20]);
-        assert!(sampled.iter().any(|p| *p != sampled[0]), "draws differ");
-        let shapes: std::collections::BTreeSet<ObjectShape> = sampled.iter().map(|p| p.theta.object.shape).collect();
-        assert!(shapes.len() > 1, "more than one shape is still possible");
-        let strongest = suggest(&prior, Method::RnnMax, &context, 40, &mut rng);
-        assert!(strongest.len() == 40 && strongest.iter().all(|p| *p == strongest[0]), "one suggestion, many times");
-        // Elsewhere nothing agrees.
-        let mut elsewhere = last.observation.clone();
-        let at = elsewhere.0.len() - 7;
-        elsewhere.0[at] += 0.5;
-        let context = Context { observation: &elsewhere, ..context };
-        assert!(suggest(&prior, Method::RnnSampling, &context, 5, &mut rng).is_empty());
-    }
-
-    #[test]
-    fn suggestions_join_the_belief_and_bring_an_unknown_obstacle_into_it() {
-        let (problem, prior) = problem("obstacle", &["planner.budget={transitions=60}", "task.horizon=6"]);
-        let play = |method, prior| {
-            let mut agent = Agent::new(&problem, method, prior).unwrap();
-            agent.run(&mut world(&problem, Seed(5)), Seed(5)).unwrap()
-        };
-        let with = play(Method::RnnSampling, Some(&prior));
-        let updates: Vec<_> = with.steps.iter().filter_map(|s| s.update.as_ref()).collect();
-        assert!(!updates.is_empty() && updates.iter().all(|u| u.proposed > 0), "{updates:?}");
-        assert!(with.steps.iter().filter_map(|s| s.obstacle_share).any(|share| share > 0.0));
-        assert!(with.steps[1..].iter().any(|s| s.reused > 0), "the pruned tree keeps its statistics");
-        let without = play(Method::NoRnn, None);
-        assert!(without.steps.iter().filter_map(|s| s.update.as_ref()).all(|u| u.proposed == 0));
-        assert!(without.steps.iter().filter_map(|s| s.obstacle_share).all(|share| share == 0.0));
-    }
-
-    #[test]
-    fn births_bring_an_unknown_obstacle_into_a_weighted_belief() {
-        let (problem, mut prior) = problem("obstacle", &[]);
-        let mut world = world(&problem, Seed(5));
-        let (observation, _) = world.reset().unwrap();
-        prior.reset();
-        prior.suggest(None, &observation);
-        let mut rng = Seed(1).stream(Purpose::Test, 0);
-        let belief = Particles::uniform(problem.initial_particles(100, &observation, &mut rng).unwrap()).unwrap();
-        assert_eq!(obstacle_share(&belief), 0.0);
-        let renewed = with_births(&problem.model, &prior, belief.clone(), 0.2, &mut rng).unwrap();
-        let born = renewed.count() - 100;
-        assert!((10..=20).contains(&born), "{born} of 20 possible");
-        // Each of the 20 draws stands for a hundredth, whether the others were possible or not.
-        for (index, (particle, weight)) in renewed.iter().enumerate() {
-            let expected = if index < 100 { (1.0 - 0.01 * born as f64) / 100.0 } else { 0.01 };
-            assert!((weight - expected).abs() < 1e-12, "{index}: {weight} {expected}");
-            assert!(problem.model.check(particle).is_ok());
-            let near = |p: &Particle| p.state.object.position_m[..2] == particle.state.object.position_m[..2];
-            assert!(belief.iter().any(|(p, _)| near(p)), "{index} stands where no particle of the belief stood");
-        }
-        let share = obstacle_share(&renewed);
-        assert!(share > 0.02 && share < 0.2, "{share}");
-        // Through the whole loop.
-        let settings = ["belief.filter=weighted", "planner.budget={transitions=60}", "task.horizon=6"];
-        let shares = |birth: &str| {
-            let (problem, prior) = self::problem("obstacle", &[&settings[..], &[birth]].concat());
-            let mut agent = Agent::new(&problem, Method::Mixture, Some(&prior)).unwrap();
-            let episode = agent.run(&mut self::world(&problem, Seed(5)), Seed(5)).unwrap();
-            let shares: Vec<f64> = episode.steps.iter().filter_map(|s| s.obstacle_share).collect();
-            assert!(!shares.is_empty());
-            shares
-        };
-        assert!(shares("agent.birth_share=0.2").iter().any(|share| *share > 0.0));
-        assert!(shares("agent.birth_share=0.0").iter().all(|share| *share == 0.0));
-    }
-
-    #[test]
-    fn particles_take_over_the_joints_of_the_arm() {
-        let (problem, _) = problem("D1", &[]);
-        let mut world = world(&problem, Seed(1));
-        let (observation, joints) = world.reset().unwrap();
-        let mut rng = Seed(1).stream(Purpose::Test, 0);
-        let particles = Particles::uniform(problem.initial_particles(20, &observation, &mut rng).unwrap()).unwrap();
-        let action = Action::ALL[0];
-        let step = world.act(action).unwrap();
-        assert_eq!(step.outcome, Outcome::Continue);
-        let mut filter = belief::RejectionFilter::new(problem.scenario.belief.rejection.clone()).unwrap();
-        let (particles, _) =
-            filter.update(&problem.model, particles, &action, &step.observation, Proposals::none(), &mut rng).unwrap();
-        let shifted: Vec<f64> = step.joints_rad.iter().map(|q| q + 0.001).collect();
-        let particles = with_known_joints(particles, &shifted).unwrap();
-        assert!(particles.iter().all(|(p, _)| p.state.joints_rad == shifted));
-        assert_ne!(joints, step.joints_rad);
-    }
-}
+mod tests;

@@ -1,6 +1,6 @@
 //! Algorithm 1 of Hayashi et al. (ICRA 2019): search from the belief, act, observe, let the network suggest, update, prune.
 //!
-//! [`Agent::run`] plays one episode on a [`World`] with one [`Method`] and returns its [`Episode`]. The world is simulated
+//! [`Agent::run`] plays one episode on a [`World`] with one [`Method`] and returns its [`Episode`]; a [`Watcher`] may look on. The world is simulated
 //! ([`SimulatedWorld`]) or another program ([`ExternalWorld`]).
 
 mod agent;
@@ -10,6 +10,7 @@ mod error;
 mod external;
 mod method;
 mod record;
+mod watch;
 mod world;
 
 pub use agent::Agent;
@@ -20,4 +21,5 @@ pub use external::{
 };
 pub use method::Method;
 pub use record::{Episode, Reason, StepRecord};
+pub use watch::{Glimpse, Watcher};
 pub use world::{SimulatedWorld, World, WorldStep};

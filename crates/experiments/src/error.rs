@@ -89,6 +89,14 @@ pub enum Error {
         #[source]
         source: std::io::Error,
     },
+    /// A file that no run of ours can have left.
+    #[error("{file}: expected a file of a run, {message}")]
+    Archive {
+        /// File.
+        file: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
     /// A record that is not one.
     #[error("{file}: line {line}: expected a trial record, {message}")]
     Record {

@@ -7,6 +7,7 @@
 //! An [`Evaluation`] is one run, a [`Player`] plays what it lacks, a [`Suite`] is all runs of a [`Plan`] and puts them side by side
 //! ([`Combined`]). What depends on the clock stands at the end of a trial's line and in files of its own.
 
+mod archive;
 mod clock;
 mod combined;
 mod error;
@@ -27,6 +28,7 @@ mod table;
 mod trial;
 mod worlds;
 
+pub use archive::Archive;
 pub use combined::{Arm, Combined, CombinedRow, Common, Comparison, Source, Sources, Total};
 pub use error::Error;
 pub use evaluation::{Evaluation, Request};
@@ -40,5 +42,5 @@ pub use run::{Provenance, Run, RunIdentity};
 pub use shards::Shard;
 pub use suite::{Suite, SuiteRequest};
 pub use table::{Row, Table};
-pub use trial::{TrialRecord, play, play_external};
+pub use trial::{TrialRecord, play, play_external, play_watched};
 pub use worlds::Worlds;

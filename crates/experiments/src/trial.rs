@@ -1,6 +1,6 @@
 //! One trial: a drawn world, one method.
 
-use agent::{Agent, BeliefErrors, Episode, Method, Reason, SimulatedWorld};
+use agent::{Agent, BeliefErrors, Episode, Method, Reason, SimulatedWorld, Watcher};
 use pomdp::{Purpose, Seed};
 use prior::Suggester;
 use scenario::Problem;
@@ -70,6 +70,22 @@ pub fn play(
     root: Seed,
     trial: u32,
 ) -> Result<(TrialRecord, Episode), Error> {
+    play_watched(problem, method, prior, root, trial, &mut ())
+}
+
+/// The same before the eyes of a watcher.
+///
+/// # Errors
+///
+/// As [`play`].
+pub fn play_watched(
+    problem: &Problem,
+    method: Method,
+    prior: Option<&Suggester>,
+    root: Seed,
+    trial: u32,
+    watcher: &mut dyn Watcher,
+) -> Result<(TrialRecord, Episode), Error> {
     let failed = |source: agent::Error| Error::Trial { trial, method: method.name(), source };
     let started = Stopwatch::start();
     let seed = root.child(Purpose::World, u64::from(trial));
@@ -77,7 +93,8 @@ pub fn play(
     let has_obstacle = start.theta.obstacle.is_some();
     let mut world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
     let mut timed = Timed::new(&mut world);
-    let episode = Agent::new(problem, method, prior).and_then(|mut a| a.run(&mut timed, seed)).map_err(failed)?;
+    let played = Agent::new(problem, method, prior).and_then(|mut a| a.run_watched(&mut timed, seed, watcher));
+    let episode = played.map_err(failed)?;
     let times = timed.times();
     Ok((record(method, trial, seed, has_obstacle, &episode).timed(started, times), episode))
 }

@@ -1,7 +1,7 @@
 //! Charts as SVG and PNG: plain data in, files out.
 //!
 //! A [`Figure`] is a grid of [`Panel`]s under one title and one legend; a panel has a [`Chart`]: [`Lines`],
-//! [`Histogram`], [`Dots`] or [`Heat`]. Equal figures give equal bytes. A series has one colour in all panels, from a
+//! [`Histogram`], [`Dots`], [`Heat`] or [`Map`]. Equal figures give equal bytes. A series has one colour in all panels, from a
 //! palette that colour-blind readers can use. The legend stands above the panels, never over data. Axis labels that
 //! neighbours repeat are written once. Numbers that are not finite are gaps; data that contradict each other are typed
 //! errors.
@@ -58,8 +58,8 @@ mod text;
 pub use error::Error;
 pub use figure::Figure;
 pub use panel::{
-    Axis, Chart, Direction, Dots, Estimate, Estimates, Heat, Histogram, Lines, Mark, Panel, Reference, Scale, Series,
-    Stroke,
+    Axis, Chart, Direction, Dots, Draw, Estimate, Estimates, Heat, Histogram, Lines, Map, Mark, Outline, Panel,
+    Reference, Scale, Series, Stroke,
 };
 
 /// Most pixels of a figure; drawing one takes 48 bytes each.

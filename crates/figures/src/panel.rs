@@ -21,6 +21,8 @@ pub enum Chart {
     Dots(Dots),
     /// A table of colours: confusion matrices.
     Heat(Heat),
+    /// Shapes in the plane, to scale: a scene from above.
+    Map(Map),
 }
 
 /// An axis with numbers.
@@ -225,4 +227,45 @@ pub struct Heat {
     pub digits: Option<usize>,
     /// What the values are, for that bar; may be empty.
     pub value_label: String,
+}
+
+/// Shapes in the plane, x to the right and y up, with one scale for both and no ticks.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Map {
+    /// (lowest, highest) x and y that are shown at least; around the shapes where `None`.
+    pub limits: Option<((f64, f64), (f64, f64))>,
+    /// What is drawn, the last on top.
+    pub shapes: Vec<Outline>,
+    /// Length of the bar that tells the scale, and its label (`10 cm`).
+    pub scale_bar: Option<(f64, String)>,
+}
+
+/// A shape of a map. A point with a number that is not finite is left out.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outline {
+    /// For the legend, and what the colour belongs to; empty for neither.
+    pub name: String,
+    /// The name whose colour it shares; its own where empty.
+    pub like: String,
+    /// (x, y); an outline that closes repeats its first point.
+    pub points: Vec<(f64, f64)>,
+    /// How it is drawn.
+    pub draw: Draw,
+}
+
+/// How a shape is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Draw {
+    /// Filled, from 0 (not to be seen) to 1; several over each other are the darker.
+    Area {
+        /// Share of the colour.
+        opacity: f64,
+    },
+    /// A line through the points.
+    #[default]
+    Line,
+    /// A dashed line through the points.
+    Dashed,
+    /// A marker at each point.
+    Markers,
 }

@@ -5,6 +5,7 @@ mod dots;
 mod heat;
 mod histogram;
 mod lines;
+mod map;
 
 use crate::axis::{SMALLEST, distinct, drawable};
 use crate::frame::{Frame, Side, Sizes};
@@ -44,6 +45,7 @@ impl Chart {
             Self::Histogram(chart) => chart,
             Self::Dots(chart) => chart,
             Self::Heat(chart) => chart,
+            Self::Map(chart) => chart,
         }
     }
 }

@@ -1,0 +1,40 @@
+//! `cargo xtask rerun`: a recording for the Rerun viewer of an episode.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result};
+use clap::Parser;
+
+/// Makes a recording for the Rerun viewer of an episode of `demo`.
+#[derive(Debug, Parser)]
+#[command(name = "to-rerun", version)]
+struct Arguments {
+    /// Folder of the episode, or its trace.json.
+    episode: PathBuf,
+    /// The recording [default: episode.rrd beside trace.json].
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let episode = &arguments.episode;
+    let trace_file = if episode.is_dir() { episode.join("trace.json") } else { episode.clone() };
+    let trace = recording::read(&trace_file)?;
+    let out = arguments.out.clone().unwrap_or_else(|| trace_file.with_file_name("episode.rrd"));
+    let bytes = recording::viewer::recording(&trace)?;
+    whole_file::write(&out, &bytes, whole_file::Existing::Replace)
+        .with_context(|| format!("cannot write {}", out.display()))?;
+    eprintln!("written to {}: open it with the viewer of Rerun 0.36.3 (pip install rerun-sdk==0.36.3)", out.display());
+    Ok(())
+}

@@ -1,0 +1,178 @@
+//! `cargo xtask demo`: one episode to look at.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use agent::Method;
+use anyhow::{Context as _, Result};
+use clap::Parser;
+use experiments::{TrialRecord, play_watched};
+use pomdp::Seed;
+use prior::Suggester;
+use recording::{EpisodeTrace, Moment};
+use report::{Observer, describe, episode_figure, episode_page};
+use scenario::{Problem, Scenario, Selection};
+
+/// Plays one episode, shows it in the terminal, and leaves a picture from above, a page and a trace of it.
+#[derive(Debug, Parser)]
+#[command(name = "demo", version)]
+struct Arguments {
+    /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
+    #[arg(long, default_value = "D4")]
+    domain: String,
+    /// Arm: sawyer or jaco.
+    #[arg(long, default_value = "sawyer")]
+    robot: String,
+    /// Preset of belief and planner.
+    #[arg(long, default_value = "surmise")]
+    preset: String,
+    /// Method: no-rnn, rnn-max, rnn-sampling, mixture, oracle or heuristic [default: mixture with preset surmise, else rnn-sampling].
+    #[arg(long)]
+    method: Option<Method>,
+    /// Root seed.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of the trial, as in `eval` with this seed. In the default one of D4 an obstacle that the robot does not know of stands in
+    /// its way.
+    #[arg(long, default_value_t = 0)]
+    trial: u32,
+    /// Small budgets: a glance whose result means nothing.
+    #[arg(long)]
+    quick: bool,
+    /// Overrides a scenario entry: key=value.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder of the trained prior [default: the one trained here with the same --quick, else the shipped one].
+    #[arg(long)]
+    prior: Option<PathBuf>,
+    /// Folder of the results [default: runs/demo/DOMAIN-ROBOT-PRESET-METHOD, or runs/quick/demo/…].
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+    /// Prints the record of the trial as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What went wrong after the input was found to be good.
+#[derive(Debug, thiserror::Error)]
+#[error("the episode was not shown")]
+struct Failed;
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            whole_file::say(&format!("error: {error:#}"));
+            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let root = match &arguments.root {
+        Some(root) => root.clone(),
+        None => scenario::find_root(&std::env::current_dir()?)?,
+    };
+    let selection = Selection {
+        root: root.clone(),
+        domain: arguments.domain.clone(),
+        robot: arguments.robot.clone(),
+        preset: arguments.preset.clone(),
+        quick: arguments.quick,
+        set: arguments.set.clone(),
+        effects: None,
+    };
+    let scenario = selection.load()?;
+    let problem = Problem::assemble(&scenario, &root)?;
+    let method = arguments.method.unwrap_or(match scenario.belief.filter {
+        scenario::Filter::Weighted => Method::Mixture,
+        scenario::Filter::Rejection => Method::RnnSampling,
+    });
+    let default = || prior::default_folder(&root, &scenario.robot.name, arguments.quick);
+    let folder = method.needs_prior().then(|| arguments.prior.clone().unwrap_or_else(default));
+    let prior = folder.map(|folder| Suggester::load(&folder, &scenario.robot.name, &problem.model)).transpose()?;
+    // What the method cannot do is said before a folder is made.
+    agent::Agent::new(&problem, method, prior.as_ref())?;
+    let out = arguments.out.clone().unwrap_or_else(|| {
+        let runs = root.join(if arguments.quick { "runs/quick/demo" } else { "runs/demo" });
+        runs.join(format!("{}-{}-{}-{}", scenario.name, scenario.robot.name, scenario.preset, method.name()))
+    });
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
+    let game = Game { arguments, scenario: &scenario, problem: &problem, method, prior: prior.as_ref() };
+    let (record, trace) = game.play(scenario::commit(&root)).context(Failed)?;
+    write(&trace, &out).context(Failed)?;
+    if arguments.json {
+        whole_file::print(&format!("{}\n", serde_json::to_string(&record)?)).context(Failed)?;
+    } else {
+        whole_file::print(&describe::summary(&trace, &record)).context(Failed)?;
+        whole_file::say(&format!("written to {}: episode.png, episode.html, trace.json", out.display()));
+    }
+    Ok(())
+}
+
+/// What is played.
+struct Game<'a> {
+    arguments: &'a Arguments,
+    scenario: &'a Scenario,
+    problem: &'a Problem,
+    method: Method,
+    prior: Option<&'a Suggester>,
+}
+
+impl Game<'_> {
+    fn play(&self, commit: String) -> Result<(TrialRecord, EpisodeTrace)> {
+        let Self { arguments, scenario, problem, method, prior } = *self;
+        let title = format!(
+            "{} with {}, preset {}, {}: trial {} of seed {}",
+            scenario.name,
+            scenario.robot.name,
+            scenario.preset,
+            method.name(),
+            arguments.trial,
+            arguments.seed
+        );
+        whole_file::say(&title);
+        let mut count = 0;
+        let mut tell = |moment: &Moment| {
+            // Whatever becomes of the terminal, the episode is played to its end.
+            whole_file::say(&describe::moment(count, moment));
+            count += 1;
+        };
+        let mut observer = Observer::new(&problem.model, &mut tell);
+        let (record, episode) =
+            play_watched(problem, method, prior, Seed(arguments.seed), arguments.trial, &mut observer)?;
+        let task = &scenario.task.goal;
+        let trace = EpisodeTrace {
+            title,
+            domain: scenario.name.clone(),
+            robot: scenario.robot.name.clone(),
+            preset: scenario.preset.clone(),
+            method: method.name().into(),
+            seed: arguments.seed,
+            trial: arguments.trial,
+            commit,
+            goal: recording::Goal { center_m: [task.x_m, task.y_m], radius_m: task.radius_m },
+            table_height_m: scenario.world.table_height_m,
+            tool: report::tool_parts(problem.model.robot()),
+            moments: observer.into_moments(),
+            reason: record.reason.name().into(),
+            success: record.success,
+            discounted_return: episode.discounted_return,
+            ..EpisodeTrace::default()
+        };
+        Ok((record, trace))
+    }
+}
+
+fn write(trace: &EpisodeTrace, out: &Path) -> Result<()> {
+    recording::write(trace, &out.join("trace.json"))?;
+    let figure = episode_figure(trace);
+    figure.save(&out.join("episode"))?;
+    let page = episode_page(trace, &figure.svg()?);
+    whole_file::write(&out.join("episode.html"), page.as_bytes(), whole_file::Existing::Replace)
+        .map_err(|e| anyhow::anyhow!("cannot write {}: {}", e.path.display(), e.source))?;
+    Ok(())
+}

@@ -1,0 +1,51 @@
+//! `cargo xtask report`: a run or an episode as a page.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result};
+use clap::Parser;
+use experiments::Archive;
+use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
+
+/// Makes a self-contained HTML page of a run of `eval`, of all tables of `eval --all`, or of an episode of `demo`.
+#[derive(Debug, Parser)]
+#[command(name = "report", version)]
+struct Arguments {
+    /// Folder of the run: runs/eval/…, runs/all, runs/demo/…, or a published one of assets/results.
+    run: PathBuf,
+    /// The page [default: report.html in that folder].
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            whole_file::say(&format!("error: {error:#}"));
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let folder = &arguments.run;
+    let page = if folder.join("trace.json").is_file() {
+        let trace = recording::read(&folder.join("trace.json"))?;
+        episode_page(&trace, &episode_figure(&trace).svg()?)
+    } else if folder.join("run.json").is_file() {
+        run_page(&Archive::read(folder)?)?
+    } else {
+        let suite = Suite::read(folder);
+        if suite.is_empty() {
+            return Err(Error::NoRun { path: folder.clone() }.into());
+        }
+        suite_page(&suite)
+    };
+    let out = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
+    whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace)
+        .with_context(|| format!("cannot write {}", out.display()))?;
+    whole_file::say(&format!("written to {}", out.display()));
+    Ok(())
+}

@@ -1,0 +1,15 @@
+//! Pictures and pages of episodes and runs, for people.
+//!
+//! An [`Observer`] looks on at an episode, of which an [`EpisodeTrace`](recording::EpisodeTrace) is kept; [`episode_figure`] draws that from above.
+//! [`episode_page`], [`run_page`] and [`suite_page`] are self-contained HTML. Programs `demo` and `report`.
+
+mod above;
+pub mod describe;
+mod error;
+mod observer;
+mod page;
+
+pub use above::episode_figure;
+pub use error::Error;
+pub use observer::{Observer, tool_parts};
+pub use page::{Suite, episode_page, run_page, suite_page};
