@@ -1,10 +1,14 @@
 //! The menu: one verb, one release program. It builds what it runs, and never links it.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+mod ci;
+mod completions;
+mod doctor;
+mod program;
 
-use anyhow::{Context as _, Result};
+use std::process::ExitCode;
+
 use clap::{Parser, Subcommand};
+use program::{become_program, become_viewer};
 
 /// Commands of the project. `cargo xtask VERB --help` lists the options of a verb.
 #[derive(Debug, Parser)]
@@ -28,6 +32,15 @@ enum Verb {
     /// Plays trials of methods on a domain and prints the table.
     #[command(disable_help_flag = true)]
     Eval(Rest),
+    /// Plays one episode to look at: in the terminal, as a picture, as a page.
+    #[command(disable_help_flag = true)]
+    Demo(Rest),
+    /// Makes a page of a run, of all tables, or of an episode.
+    #[command(disable_help_flag = true)]
+    Report(Rest),
+    /// Makes a recording for the Rerun viewer of an episode of demo. The first time it compiles the viewer's library, for a quarter of an hour.
+    #[command(disable_help_flag = true)]
+    Rerun(Rest),
     /// Turns published measurements into a log that can be diagnosed.
     #[command(disable_help_flag = true)]
     ImportLog(Rest),
@@ -43,6 +56,13 @@ enum Verb {
     /// Times the parts and checks their accuracy, beside peers where those are installed.
     #[command(disable_help_flag = true)]
     Bench(Rest),
+    /// Explains every key of a scenario, and describes the files to editors.
+    #[command(disable_help_flag = true)]
+    Scenario(Rest),
+    /// Checks that this machine has what the project needs, before anything is built.
+    Doctor(doctor::Options),
+    /// Prints a script that completes these commands in a shell.
+    Completions(completions::Options),
     /// Runs exactly what CI runs: formatting, lints, all tests.
     Ci,
 }
@@ -56,75 +76,25 @@ struct Rest {
 
 fn main() -> ExitCode {
     let result = match Menu::parse().verb {
-        Verb::Datagen(rest) => program("datagen", &rest.arguments),
-        Verb::Train(rest) => program("train", &rest.arguments),
-        Verb::Calibrate(rest) => program("calibrate", &rest.arguments),
-        Verb::Eval(rest) => program("eval", &rest.arguments),
-        Verb::ImportLog(rest) => program("import-log", &rest.arguments),
-        Verb::RecordLog(rest) => program("record-log", &rest.arguments),
-        Verb::Diagnose(rest) => program("diagnose", &rest.arguments),
-        Verb::DiagnoseBenchmark(rest) => program("diagnose-benchmark", &rest.arguments),
-        Verb::Bench(rest) => program("bench", &rest.arguments),
-        Verb::Ci => ci(),
+        Verb::Datagen(rest) => become_program("datagen", &rest.arguments),
+        Verb::Train(rest) => become_program("train", &rest.arguments),
+        Verb::Calibrate(rest) => become_program("calibrate", &rest.arguments),
+        Verb::Eval(rest) => become_program("eval", &rest.arguments),
+        Verb::Demo(rest) => become_program("demo", &rest.arguments),
+        Verb::Report(rest) => become_program("report", &rest.arguments),
+        Verb::Rerun(rest) => become_viewer(&rest.arguments),
+        Verb::ImportLog(rest) => become_program("import-log", &rest.arguments),
+        Verb::RecordLog(rest) => become_program("record-log", &rest.arguments),
+        Verb::Diagnose(rest) => become_program("diagnose", &rest.arguments),
+        Verb::DiagnoseBenchmark(rest) => become_program("diagnose-benchmark", &rest.arguments),
+        Verb::Bench(rest) => become_program("bench", &rest.arguments),
+        Verb::Scenario(rest) => become_program("scenario", &rest.arguments),
+        Verb::Doctor(options) => doctor::run(&options),
+        Verb::Completions(options) => completions::run(&options),
+        Verb::Ci => ci::run(),
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");
         ExitCode::FAILURE
     })
-}
-
-/// Builds the release programs and becomes one of them. All are built together: built one by one, cargo would choose other features for
-/// the shared dependencies and compile them again.
-fn program(binary: &str, arguments: &[String]) -> Result<ExitCode> {
-    let root = root();
-    let built = cargo(&root).args(["build", "--release", "--quiet", "--workspace", "--bins"]).status();
-    if !built.context("cannot run cargo")?.success() {
-        return Ok(ExitCode::FAILURE);
-    }
-    let path = target(&root).join("release").join(binary);
-    let mut command = Command::new(&path);
-    command.args(arguments);
-    // Becoming the program hands on its exit code, its terminal and every signal, an interrupt among them.
-    #[cfg(unix)]
-    {
-        use std::os::unix::process::CommandExt as _;
-        Err(command.exec()).with_context(|| format!("cannot run {}", path.display()))
-    }
-    #[cfg(not(unix))]
-    {
-        let status = command.status().with_context(|| format!("cannot run {}", path.display()))?;
-        Ok(ExitCode::from(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)))
-    }
-}
-
-fn ci() -> Result<ExitCode> {
-    let root = root();
-    let steps: [&[&str]; 3] = [
-        &["fmt", "--all", "--check"],
-        &["clippy", "--release", "--workspace", "--all-targets", "--", "--deny", "warnings"],
-        &["test", "--release", "--workspace"],
-    ];
-    for step in steps {
-        eprintln!("cargo {}", step.join(" "));
-        if !cargo(&root).args(step).status().context("cannot run cargo")?.success() {
-            return Ok(ExitCode::FAILURE);
-        }
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-fn cargo(root: &Path) -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(root);
-    command
-}
-
-/// The workspace that this program was built in.
-fn root() -> PathBuf {
-    let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    package.ancestors().nth(2).unwrap_or(package).to_path_buf()
-}
-
-fn target(root: &Path) -> PathBuf {
-    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
 }
