@@ -1,0 +1,9 @@
+//! A body and valid inputs for each reader.
+
+pub mod checkpoint;
+pub mod dataset_shard;
+pub mod measured_log;
+pub mod model_toml;
+pub mod robot;
+pub mod scenario_toml;
+pub mod world_protocol;
