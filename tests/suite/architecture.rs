@@ -2,8 +2,33 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use cargo_metadata::{DependencyKind, MetadataCommand};
-use end_to_end::root;
+use std::process::Command;
+
+use end_to_end::{root, stderr};
+use serde_json::Value;
+
+/// Packages with programs that do not train.
+const LIGHT: [&str; 7] =
+    ["datagen", "diagnose-benchmark", "discrepancy", "experiments", "measured-log", "report", "scenario"];
+
+/// What cargo prints.
+fn cargo(arguments: &[&str]) -> String {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let output = Command::new(cargo).current_dir(root()).args(arguments).output().unwrap();
+    assert!(output.status.success(), "cargo {}: {}", arguments.join(" "), stderr(&output));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Members of the workspace with the names of what they depend on, but for tests.
+fn members() -> Vec<(String, Vec<String>)> {
+    let metadata: Value = serde_json::from_str(&cargo(&["metadata", "--no-deps", "--format-version", "1"])).unwrap();
+    let name = |value: &Value| value["name"].as_str().unwrap().to_owned();
+    let member = |package: &Value| {
+        let all = package["dependencies"].as_array().unwrap();
+        (name(package), all.iter().filter(|dependency| dependency["kind"].is_null()).map(name).collect())
+    };
+    metadata["packages"].as_array().unwrap().iter().map(member).collect()
+}
 
 #[test]
 fn crates_use_only_what_the_architecture_table_says() {
@@ -14,25 +39,23 @@ fn crates_use_only_what_the_architecture_table_says() {
         let uses = cells[2].split(',').map(str::trim).filter(|c| *c != "–").map(String::from).collect();
         table.insert(cells[1].trim_matches('`').to_string(), uses);
     }
-    let metadata = MetadataCommand::new().manifest_path(root().join("Cargo.toml")).no_deps().exec().unwrap();
-    let ours: BTreeSet<String> = metadata.packages.iter().map(|p| p.name.to_string()).collect();
-    for package in &metadata.packages {
-        let name = package.name.to_string();
+    let members = members();
+    let ours: BTreeSet<String> = members.iter().map(|(name, _)| name.clone()).collect();
+    for (name, dependencies) in &members {
         if name == "end-to-end" {
             continue;
         }
-        assert!(table.contains_key(&name), "{name} is missing in ARCHITECTURE.md");
+        assert!(table.contains_key(name), "{name} is missing in ARCHITECTURE.md");
         // What the cell names, and what those cells name.
         let mut allowed = BTreeSet::new();
-        let mut open = table[&name].clone();
+        let mut open = table[name].clone();
         while let Some(next) = open.pop() {
             assert!(ours.contains(&next), "ARCHITECTURE.md: {name} uses {next}, which does not exist");
             if allowed.insert(next.clone()) {
                 open.extend(table[&next].clone());
             }
         }
-        for dependency in package.dependencies.iter().filter(|d| d.kind == DependencyKind::Normal) {
-            let used = &dependency.name;
+        for used in dependencies {
             assert!(!ours.contains(used) || allowed.contains(used), "{name} uses {used} against ARCHITECTURE.md");
         }
     }
@@ -43,9 +66,35 @@ fn crates_use_only_what_the_architecture_table_says() {
 
 #[test]
 fn only_the_prior_and_what_needs_it_link_burn() {
-    let metadata = MetadataCommand::new().manifest_path(root().join("Cargo.toml")).no_deps().exec().unwrap();
-    for package in &metadata.packages {
-        let links = package.dependencies.iter().any(|d| d.name == "burn");
-        assert_eq!(links, *package.name == "prior", "{}", package.name);
+    for (name, dependencies) in members() {
+        let links = dependencies.iter().any(|dependency| dependency == "burn");
+        assert_eq!(links, name == "prior", "{name}");
+    }
+}
+
+/// `cargo xtask` builds a program with `report` and `measured-log` beside it: what such programs share must be compiled once, and burn, which takes most of
+/// a cold build, not at all. Those that train are apart.
+#[test]
+fn programs_that_are_built_one_by_one_share_their_dependencies_and_do_without_burn() {
+    /// Crates with the choices of features that they are compiled with.
+    type Tree = BTreeMap<String, BTreeSet<String>>;
+    let tree = |program: &str| -> Tree {
+        let options = ["--edges", "normal,build", "--prefix", "none", "--no-dedupe", "--format", "{p}|{f}"];
+        let selection = ["--package", "report", "--package", "measured-log", "--package", program];
+        let mut tree = Tree::new();
+        for line in cargo(&[&["tree"][..], &selection, &options].concat()).lines() {
+            // An empty line between the packages that were selected.
+            let Some((name, features)) = line.split_once('|') else { continue };
+            tree.entry(name.into()).or_default().insert(features.into());
+        }
+        tree
+    };
+    let base = tree("report");
+    for program in LIGHT {
+        let some = tree(program);
+        assert!(!some.keys().any(|name| name.starts_with("burn")), "{program} compiles burn");
+        for (name, features) in &base {
+            assert_eq!(some.get(name), Some(features), "{name}, with {program}");
+        }
     }
 }

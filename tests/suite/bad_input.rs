@@ -7,7 +7,7 @@ use end_to_end::{files, root, run, stderr};
 use crate::pipeline::trained;
 
 /// Runs, expects exit code 2 and one line that holds all `parts`.
-fn refused(binary: &str, arguments: &str, parts: &[&str]) {
+pub(crate) fn refused(binary: &str, arguments: &str, parts: &[&str]) {
     let output = run(binary, arguments);
     let message = stderr(&output);
     assert_eq!(output.status.code(), Some(2), "{binary} {arguments}: {message}");

@@ -1,0 +1,186 @@
+//! What the documents tell people to type works: every option exists, and what takes seconds is played, with small budgets and in a folder
+//! of its own.
+
+use std::path::{Path, PathBuf};
+
+use end_to_end::{program, root, stderr};
+
+/// Verbs whose work takes minutes and is done by other tests: here they only have to accept their options.
+const PLAYED_ELSEWHERE: [&str; 4] = ["bench", "calibrate", "diagnose", "diagnose-benchmark"];
+/// Verbs of `cargo xtask` that are no programs of ours, or need what a machine need not have.
+const NOT_HERE: [&str; 2] = ["ci", "rerun"];
+
+/// Lines of a document's code blocks that begin with `cargo xtask`, without their comments.
+fn commands(document: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(document).unwrap_or_else(|e| panic!("{}: {e}", document.display()));
+    let mut inside = false;
+    let mut found = Vec::new();
+    for line in text.lines().map(str::trim) {
+        if line.starts_with("```") {
+            inside = !inside;
+        } else if let Some(command) = line.strip_prefix("cargo xtask ").filter(|_| inside) {
+            found.push(command.split(" #").next().unwrap_or(command).trim().to_owned());
+        }
+    }
+    found
+}
+
+/// Words as a shell splits them.
+fn words(command: &str) -> Vec<String> {
+    let mut words: Vec<String> = Vec::new();
+    let (mut word, mut quote, mut any) = (String::new(), None, false);
+    for c in command.chars() {
+        match (quote, c) {
+            (None, '\'' | '"') => (quote, any) = (Some(c), true),
+            (Some(q), c) if c == q => quote = None,
+            (None, ' ') => {
+                if any || !word.is_empty() {
+                    words.push(std::mem::take(&mut word));
+                }
+                any = false;
+            }
+            (_, c) => word.push(c),
+        }
+    }
+    if any || !word.is_empty() {
+        words.push(word);
+    }
+    words
+}
+
+/// Whether a line lists what may be typed rather than what to type.
+fn is_synopsis(command: &str) -> bool {
+    ["[--", "…", "|"].iter().any(|part| command.contains(part))
+        || words(command).iter().any(|word| word.len() > 2 && word.chars().all(|c| c.is_ascii_uppercase() || c == '.'))
+}
+
+fn documents() -> Vec<PathBuf> {
+    let mut documents = vec![root().join("README.md")];
+    let docs = std::fs::read_dir(root().join("docs")).unwrap();
+    documents
+        .extend(docs.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "md")));
+    documents.sort();
+    documents
+}
+
+#[test]
+fn every_option_in_the_documents_exists() {
+    let mut checked = 0;
+    for document in documents() {
+        for command in commands(&document) {
+            let verb = words(&command)[0].clone();
+            if NOT_HERE.contains(&verb.as_str()) {
+                continue;
+            }
+            let text = help(&verb);
+            for option in command.split([' ', '[', ']', '|']).filter(|word| word.starts_with("--")) {
+                let option = option.split('=').next().unwrap_or(option);
+                assert!(text.contains(option), "{}: {verb} has no {option}", document.display());
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 50, "{checked} options");
+}
+
+/// The help of a verb, and of its own verbs.
+fn help(verb: &str) -> String {
+    let own: &[&str] = match verb {
+        "bench" => &["physics", "belief", "planner", "prior", "accuracy"],
+        "import-log" => &["contactnets", "cmu-push"],
+        "scenario" => &["check", "schema"],
+        _ => &[],
+    };
+    let mut text = String::new();
+    for own in std::iter::once(None).chain(own.iter().map(Some)) {
+        let output = tool(verb).args(own).arg("--help").output().unwrap();
+        assert!(output.status.success(), "{verb}: {}", stderr(&output));
+        text += &String::from_utf8_lossy(&output.stdout);
+    }
+    text
+}
+
+/// The program behind a verb.
+fn tool(verb: &str) -> std::process::Command {
+    match verb {
+        "doctor" | "completions" => {
+            let mut menu = program("xtask");
+            menu.arg(verb);
+            menu
+        }
+        _ => program(verb),
+    }
+}
+
+/// A copy of the project that shares all but its results, to play in.
+fn copy_of_the_project() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(root()).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name();
+        if !["runs", "target", ".git"].iter().any(|own| name == *own) {
+            std::os::unix::fs::symlink(entry.path(), folder.path().join(name)).unwrap();
+        }
+    }
+    let arm = std::fs::read_to_string(root().join("scenarios/robots/jaco.toml")).unwrap();
+    std::fs::write(folder.path().join("my-arm.toml"), arm.replace("name = \"jaco\"", "name = \"my-arm\"")).unwrap();
+    folder
+}
+
+/// Played in order, so that a command finds what those above it left.
+fn play(document: &str) {
+    let project = copy_of_the_project();
+    let mut played = 0;
+    for command in commands(&root().join(document)) {
+        let all = words(&command);
+        let (verb, rest) = (all[0].as_str(), &all[1..]);
+        let heavy = PLAYED_ELSEWHERE.contains(&verb) || NOT_HERE.contains(&verb);
+        // An engine, another simulator, a robot behind a socket, and models that only `diagnose` leaves.
+        let absent = ["slurm", "hq", "mujoco_jaco.py", "tcp://127.0.0.1:5555", "model.toml"];
+        if heavy || is_synopsis(&command) || absent.iter().any(|part| command.contains(part)) {
+            continue;
+        }
+        let mut program = tool(verb);
+        // Results of --quick lie apart from those of the documents.
+        let quick = |word: &String| match verb {
+            "report" => word.replace("runs/", "runs/quick/"),
+            _ => word.clone(),
+        };
+        program.current_dir(project.path()).args(rest.iter().map(quick));
+        if matches!(verb, "datagen" | "train" | "eval" | "demo") {
+            program.arg("--quick");
+        }
+        if verb == "eval" && !rest.contains(&"--trials".into()) {
+            program.args(["--trials", "1"]);
+        }
+        let output = program.output().unwrap();
+        assert!(output.status.success(), "{document}: {command}: {}", stderr(&output));
+        played += 1;
+    }
+    assert!(played > 0, "{document}: nothing was played");
+}
+
+#[test]
+fn the_readme_works() {
+    play("README.md");
+}
+
+#[test]
+fn the_guide_to_your_own_arm_works() {
+    play("docs/your-arm.md");
+}
+
+#[test]
+fn the_guide_to_your_own_logs_works() {
+    play("docs/your-logs.md");
+}
+
+#[test]
+fn the_guide_to_your_own_effect_works() {
+    play("docs/your-effect.md");
+}
+
+#[test]
+fn the_guide_to_other_worlds_works() {
+    play("docs/world-protocol.md");
+}

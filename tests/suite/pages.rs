@@ -1,0 +1,89 @@
+//! Pages in a real browser, where there is one: what it makes of them has all parts, and is drawn.
+
+use std::path::Path;
+use std::process::Command;
+
+use end_to_end::{program, root, stderr};
+
+/// Debian's name and that of others.
+const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
+
+/// A browser that answers, or the reason why there is none.
+fn browser() -> Option<&'static str> {
+    let answers = |name: &&&str| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success());
+    let found = BROWSERS.iter().find(answers).copied();
+    if found.is_none() {
+        eprintln!("skipped: none of {} is installed", BROWSERS.join(", "));
+    }
+    found
+}
+
+/// What the browser prints with these options.
+fn browse(browser: &str, options: &[&str], page: &Path) -> String {
+    let profile = tempfile::tempdir().unwrap();
+    let output = Command::new(browser)
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1100,1600"])
+        // Whoever asks the network for something would fail here.
+        .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--disable-background-networking"])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .args(options)
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{browser}: {}", stderr(&output));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Share of the pixels that differ from the first one, and the picture's size.
+fn ink(picture: &Path) -> (f64, u32, u32) {
+    let decoder = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(picture).unwrap()));
+    let mut reader = decoder.read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    let size = info.color_type.samples();
+    let pixels: Vec<&[u8]> = bytes[..info.buffer_size()].chunks_exact(size).collect();
+    let other = pixels.iter().filter(|pixel| **pixel != pixels[0]).count();
+    (other as f64 / pixels.len() as f64, info.width, info.height)
+}
+
+fn check(browser: &str, page: &Path, sections: &[&str], figures: usize) {
+    let dom = browse(browser, &["--dump-dom"], page);
+    for id in sections {
+        assert!(dom.contains(&format!("<section id=\"{id}\">")), "{}: no section {id}", page.display());
+    }
+    assert_eq!(dom.matches("<figure").count(), figures, "{}", page.display());
+    // A browser mends what it cannot read: a mended page would no longer nest as it was written.
+    assert_eq!(dom.matches("</svg></figure>").count(), figures, "{}", page.display());
+    assert_eq!(dom.matches("<section").count(), sections.len(), "{}", page.display());
+    let picture = page.with_extension("png");
+    browse(browser, &[&format!("--screenshot={}", picture.display())], page);
+    let (ink, width, height) = ink(&picture);
+    assert_eq!((width, height), (1100, 1600));
+    assert!(ink > 0.02 && ink < 0.98, "{}: {ink} of the pixels are drawn on", page.display());
+}
+
+#[test]
+fn the_pages_of_runs_and_episodes_are_whole_in_a_browser() {
+    let Some(browser) = browser() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let page = |name: &str| folder.path().join(name);
+    let report = |run: &Path, name: &str| {
+        let output = program("report").arg(run).arg("--out").arg(page(name)).output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+    };
+    report(&root().join("assets/results/table1-surmise-D4"), "run.html");
+    let sections = ["success", "pictures", "failures", "pairs", "trials", "source"];
+    check(browser, &page("run.html"), &sections, 3);
+
+    report(&root().join("assets/results"), "all.html");
+    let figures = std::fs::read_to_string(page("all.html")).unwrap().matches("<figure").count();
+    assert!(figures >= 5, "{figures}");
+    check(browser, &page("all.html"), &["table1", "table2"], figures);
+
+    let demo = program("demo").args(["--domain", "D4", "--quick", "--out"]).arg(page("demo")).output().unwrap();
+    assert!(demo.status.success(), "{}", stderr(&demo));
+    let sections = ["above", "belief", "steps", "source"];
+    check(browser, &page("demo").join("episode.html"), &sections, 1);
+    let (ink, ..) = ink(&page("demo").join("episode.png"));
+    assert!(ink > 0.02 && ink < 0.5, "{ink} of the picture's pixels are drawn on");
+}
