@@ -11,6 +11,7 @@ mod docs;
 mod doctor;
 mod kills;
 mod licences;
+mod output;
 mod pages;
 mod pipeline;
 mod world;

@@ -98,7 +98,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(2)
         }
     }
@@ -112,11 +112,11 @@ fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         What::Physics { rounds, actions, json } => {
             let effort = Effort { rounds: *rounds as usize, actions: *actions as usize };
-            let result = physics::run(&root, effort, |text| eprintln!("{text}"))?;
+            let result = physics::run(&root, effort, |text| whole_file::say!("{text}"))?;
             if *json {
-                println!("{result}");
+                whole_file::out!("{result}");
             } else {
-                print!("{}", table(&result));
+                whole_file::show(&table(&result));
             }
         }
         What::Belief { domain, episodes, seed, quick, set } => {
@@ -127,27 +127,27 @@ fn run(arguments: &Arguments) -> Result<()> {
                 quick: *quick,
                 set: set.clone(),
             };
-            let result = belief::run(&root, &task, |text| eprintln!("{text}"))?;
-            println!("{}", serde_json::to_string_pretty(&result)?);
+            let result = belief::run(&root, &task, |text| whole_file::say!("{text}"))?;
+            whole_file::out!("{}", serde_json::to_string_pretty(&result)?);
         }
         What::Planner { episodes, quick, json } => {
             let effort = planner::Effort { episodes: *episodes, quick: *quick };
-            let result = planner::run(effort, |text| eprintln!("{text}"))?;
+            let result = planner::run(effort, |text| whole_file::say!("{text}"))?;
             if *json {
-                println!("{result}");
+                whole_file::out!("{result}");
             } else {
-                print!("{}", planner::table(&result));
+                whole_file::show(&planner::table(&result));
             }
         }
         What::Prior { rounds, steps, data, compile, json } => {
             let made = ["runs/data/sawyer", "runs/quick/data/sawyer"].map(|folder| root.join(folder));
             let data = data.clone().or_else(|| made.into_iter().find(|folder| folder.join("meta/info.json").is_file()));
             let effort = prior::Effort { rounds: *rounds as usize, steps: *steps as usize, data, compile: *compile };
-            let result = prior::run(&root, &effort, |text| eprintln!("{text}"))?;
+            let result = prior::run(&root, &effort, |text| whole_file::say!("{text}"))?;
             if *json {
-                println!("{result}");
+                whole_file::out!("{result}");
             } else {
-                print!("{}", prior::table(&result));
+                whole_file::show(&prior::table(&result));
             }
         }
         What::Accuracy { write, set } => {
@@ -157,7 +157,7 @@ fn run(arguments: &Arguments) -> Result<()> {
                 let path = root.join(report::PAGE);
                 std::fs::write(&path, &page).with_context(|| path.display().to_string())?;
             } else {
-                print!("{page}");
+                whole_file::show(&page);
             }
         }
     }

@@ -78,11 +78,11 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => {
-            eprintln!("interrupted: finished shards are kept, run the same command again to go on");
+            whole_file::say!("interrupted: finished shards are kept, run the same command again to go on");
             ExitCode::from(130)
         }
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -104,7 +104,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let missing = job.missing_shards()?;
     let resumed = job.plan.shards as usize - missing.len();
     if resumed > 0 {
-        eprintln!("{resumed} of {} shards are finished already", job.plan.shards);
+        whole_file::say!("{resumed} of {} shards are finished already", job.plan.shards);
     }
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
@@ -185,7 +185,7 @@ impl Job {
         if !matches!(dataset::shard_state(&self.out, shard, &self.hash)?, ShardState::Finished(_)) {
             self.make(shard).context(Failed)?;
         }
-        eprintln!("shard {shard} is finished");
+        whole_file::say!("shard {shard} is finished");
         Ok(())
     }
 
@@ -198,7 +198,7 @@ impl Job {
             let info = self.make(index)?;
             bar.inc(self.plan.episodes_per_shard);
             if bar.is_hidden() {
-                eprintln!("shard {index}: {} transitions", info.rows - info.episodes);
+                whole_file::say!("shard {index}: {} transitions", info.rows - info.episodes);
             }
             Ok(())
         };
@@ -211,7 +211,7 @@ impl Job {
         let array = Array { engine, label: "datagen", folder: &self.out, processors: 1 };
         let there = |index: &&u32| self.out.join(dataset::shard_path(**index)).exists();
         let mut report = |event| match event {
-            Event::News(news) => bar.suspend(|| eprintln!("{news}")),
+            Event::News(news) => bar.suspend(|| whole_file::say!("{news}")),
             Event::Looked => {
                 bar.set_position(missing.iter().filter(there).count() as u64 * self.plan.episodes_per_shard);
             }
@@ -264,10 +264,10 @@ impl Job {
                 "out": self.out, "robot": self.robot, "transitions": manifest.transitions, "episodes": manifest.episodes,
                 "counts": manifest.counts, "seconds": seconds, "transitions_per_second": rate,
             });
-            println!("{summary}");
+            whole_file::out!("{summary}");
             return;
         }
-        println!(
+        whole_file::out!(
             "{}: {} transitions in {} episodes, {} shards; {}; {:.1} s, {:.0} transitions/s",
             self.out.display(),
             manifest.transitions,

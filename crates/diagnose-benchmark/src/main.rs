@@ -77,11 +77,11 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => {
-            eprintln!("interrupted: finished sets are kept, run the same command again to go on");
+            whole_file::say!("interrupted: finished sets are kept, run the same command again to go on");
             ExitCode::from(130)
         }
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -125,8 +125,8 @@ fn run(arguments: &Arguments) -> Result<bool> {
         results.into_iter().filter_map(Result::transpose).collect::<Result<_>>().context(Failed)?;
     let table = Table::new(&scores, plan.len() - scores.len(), arguments.baselines);
     write(&folder, &table, &scores).context(Failed)?;
-    print!("{}\n{}", table.to_markdown(), table.confusion_to_markdown());
-    eprintln!("written to {}", arguments.out.display());
+    whole_file::show(&format!("{}\n{}", table.to_markdown(), table.confusion_to_markdown()));
+    whole_file::say!("written to {}", arguments.out.display());
     Ok(true)
 }
 
@@ -142,7 +142,7 @@ fn answer(
     let missing: Vec<usize> =
         (0..plan.len()).filter(|set| !folder.is_answered(*set) || !folder.truth(*set).exists()).collect();
     if missing.len() < plan.len() {
-        eprintln!("{} sets are finished already", plan.len() - missing.len());
+        whole_file::say!("{} sets are finished already", plan.len() - missing.len());
     }
     let bar = ProgressBar::new(missing.len() as u64);
     let style = "{bar:40} {pos}/{len} sets, {per_sec}, {eta} left {msg}";
@@ -159,7 +159,7 @@ fn answer(
             if interrupted.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            bar.suspend(|| eprintln!("{}: {error:#}", name(*set)));
+            bar.suspend(|| whole_file::say!("{}: {error:#}", name(*set)));
             return Err(error);
         }
         Ok(())

@@ -40,7 +40,7 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            whole_file::say!("error: {error}");
             // 2 is bad input; a disk that refuses is a failure.
             if let Error::Write { .. } | Error::Folder { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
         }
@@ -72,7 +72,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
     }
     if arguments.json {
-        print!("{json}");
+        whole_file::show(&json);
     } else {
         print_summary(&report, &out);
     }
@@ -85,24 +85,29 @@ fn default_folder(measured: &Path) -> PathBuf {
 }
 
 fn print_summary(report: &Report, out: &Path) {
-    println!("{}", report.summary);
+    whole_file::out!("{}", report.summary);
     for effect in &report.effects {
-        println!("  {} (confidence {:.2}): {}", effect.name, effect.confidence, effect.description);
+        whole_file::out!("  {} (confidence {:.2}): {}", effect.name, effect.confidence, effect.description);
         for value in &effect.parameters {
             let [low, high] = value.interval90;
-            println!("    {} = {:.4} {} (90 %: {low:.4} to {high:.4})", value.key, value.value, value.unit);
+            whole_file::out!("    {} = {:.4} {} (90 %: {low:.4} to {high:.4})", value.key, value.value, value.unit);
         }
     }
     if report.confusion_set.len() > 1 {
-        println!("  not told apart: {}", report.confusion_set.join(", "));
+        whole_file::out!("  not told apart: {}", report.confusion_set.join(", "));
     }
     if let Some(description) = &report.description {
-        println!("  what is left: {description}");
+        whole_file::out!("  what is left: {description}");
     }
     for cell in report.located.iter().take(3).filter(|cell| cell.share > 0.0) {
         let (channel, phase) = (cell.channel.name(), cell.phase.name());
-        println!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
+        whole_file::out!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
     }
-    println!("  next: {}", report.next_experiment);
-    println!("{} simulated episodes, {:.0} s; {}", report.rollouts, report.seconds, out.join("report.html").display());
+    whole_file::out!("  next: {}", report.next_experiment);
+    whole_file::out!(
+        "{} simulated episodes, {:.0} s; {}",
+        report.rollouts,
+        report.seconds,
+        out.join("report.html").display()
+    );
 }

@@ -117,11 +117,11 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => {
-            eprintln!("interrupted: finished trials are kept, run the same command again to go on");
+            whole_file::say!("interrupted: finished trials are kept, run the same command again to go on");
             ExitCode::from(130)
         }
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -142,7 +142,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
 fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     let evaluation = Evaluation::prepare(&request(arguments, root, domain))?;
     if let Some(folder) = evaluation.prior_folder() {
-        eprintln!("prior: {}", folder.display());
+        whole_file::say!("prior: {}", folder.display());
     }
     let out = arguments.out.clone().unwrap_or_else(|| {
         root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(evaluation.name())
@@ -159,7 +159,7 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     }
     let run = evaluation.open(&out)?;
     if run.resumed() > 0 {
-        eprintln!("{} trials are finished already", run.resumed());
+        whole_file::say!("{} trials are finished already", run.resumed());
     }
     let interrupted = listen_for_interrupts()?;
     let finished = match arguments.executor {
@@ -174,10 +174,10 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     }
     let table = evaluation.finish(&run).context(Failed)?;
     if arguments.json {
-        println!("{}", serde_json::to_string(&table)?);
+        whole_file::out!("{}", serde_json::to_string(&table)?);
     } else {
-        print!("{}", table.to_markdown());
-        eprintln!("written to {}", out.display());
+        whole_file::show(&table.to_markdown());
+        whole_file::say!("written to {}", out.display());
     }
     Ok(true)
 }
@@ -198,7 +198,7 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
         python: arguments.python.clone(),
         timeouts: timeouts(arguments),
     };
-    let mut note = |text: &str| eprintln!("{text}");
+    let mut note = |text: &str| whole_file::say!("{text}");
     let suite = Suite::prepare(request, &mut note)?;
     let interrupted = listen_for_interrupts()?;
     let player = Player { threads: arguments.threads, interrupted: &interrupted };
@@ -207,17 +207,17 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
     }
     let tables = suite.combine().context(Failed)?;
     if arguments.json {
-        println!("{}", serde_json::to_string(&tables)?);
+        whole_file::out!("{}", serde_json::to_string(&tables)?);
     } else {
         for table in &tables {
-            println!("{}", table.to_markdown());
+            whole_file::out!("{}", table.to_markdown());
         }
-        eprintln!("written to {}", out.display());
+        whole_file::say!("written to {}", out.display());
     }
     if arguments.publish {
         let to = root.join("assets/results");
         suite.publish(&to).context(Failed)?;
-        eprintln!("published to {}", to.display());
+        whole_file::say!("published to {}", to.display());
     }
     Ok(true)
 }
@@ -264,11 +264,11 @@ fn check_shards(arguments: &Arguments) -> Result<()> {
 fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &AtomicBool) -> Result<bool> {
     let mut finished = run.resumed();
     let mut report = |event| match event {
-        Event::News(news) => eprintln!("{news}"),
+        Event::News(news) => whole_file::say!("{news}"),
         Event::Looked => {
             let now = run.trials().map_or(finished, |trials| trials.len());
             if now > finished {
-                eprintln!("{now} trials are finished");
+                whole_file::say!("{now} trials are finished");
             }
             finished = now;
         }

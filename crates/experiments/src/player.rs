@@ -70,10 +70,10 @@ fn play_one(evaluation: &Evaluation, method: Method, trial: u32) -> Result<Trial
 fn report(bar: &ProgressBar, record: &TrialRecord) {
     let TrialRecord { method, trial, reason, steps, seconds, failure, .. } = record;
     if let Some(failure) = failure {
-        bar.suspend(|| eprintln!("{} trial {trial}: {failure}", method.name()));
+        bar.suspend(|| whole_file::say!("{} trial {trial}: {failure}", method.name()));
     }
     bar.inc(1);
     if bar.is_hidden() {
-        eprintln!("{} trial {trial}: {} after {steps} actions, {seconds:.1} s", method.name(), reason.name());
+        whole_file::say!("{} trial {trial}: {} after {steps} actions, {seconds:.1} s", method.name(), reason.name());
     }
 }

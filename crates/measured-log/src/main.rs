@@ -59,7 +59,7 @@ fn main() -> ExitCode {
     match imported.and_then(|(log, notes)| write(&target, &log, &notes)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            whole_file::say!("error: {error}");
             // 2 is bad input; a disk that refuses is a failure.
             if let Error::Write { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
         }
@@ -73,6 +73,6 @@ fn write(target: &Target, log: &Log, notes: &Notes) -> Result<(), Error> {
     };
     measured_log::write(&target.out, log, format, notes)?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
-    println!("{}: {} episodes, {rows} rows", target.out.display(), log.episodes.len());
+    whole_file::out!("{}: {} episodes, {rows} rows", target.out.display(), log.episodes.len());
     Ok(())
 }

@@ -88,11 +88,11 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => {
-            eprintln!("interrupted: finished epochs are kept, run the same command again to go on");
+            whole_file::say!("interrupted: finished epochs are kept, run the same command again to go on");
             ExitCode::from(130)
         }
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -159,7 +159,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     checkpoint.save(&out).context(Failed)?;
     write_atomically(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes()).context(Failed)?;
     prior::pictures::learning_curve(&arguments.robot, trainer.curve()).save(&out.join("curve")).context(Failed)?;
-    println!(
+    whole_file::out!(
         "{}: best epoch {} of {}, held-out {:.3} nats a step on {} episodes",
         out.display(),
         checkpoint.facts.best_epoch,
@@ -205,7 +205,7 @@ fn open_trainer(
             seed.0,
         ));
     }
-    eprintln!("{} epochs are finished already", trainer.curve().len());
+    whole_file::say!("{} epochs are finished already", trainer.curve().len());
     Ok(trainer)
 }
 
@@ -237,7 +237,7 @@ fn train(trainer: &mut Trainer, config: &TrainConfig, state: &Path) -> Result<bo
             started.elapsed().as_secs_f64(),
         );
         if bar.is_hidden() {
-            eprintln!("{line}");
+            whole_file::say!("{line}");
         } else {
             bar.set_message(line);
         }

@@ -21,7 +21,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(2)
         }
     }
@@ -35,6 +35,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     let bytes = recording::viewer::recording(&trace)?;
     whole_file::write(&out, &bytes, whole_file::Existing::Replace)
         .with_context(|| format!("cannot write {}", out.display()))?;
-    eprintln!("written to {}: open it with the viewer of Rerun 0.36.3 (pip install rerun-sdk==0.36.3)", out.display());
+    whole_file::say!(
+        "written to {}: open it with the viewer of Rerun 0.36.3 (pip install rerun-sdk==0.36.3)",
+        out.display()
+    );
     Ok(())
 }

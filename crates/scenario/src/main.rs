@@ -77,12 +77,12 @@ fn main() -> ExitCode {
         Ok(text) => match whole_file::print(&text) {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
-                whole_file::say(&format!("error: cannot print: {error}"));
+                whole_file::say!("error: cannot print: {error}");
                 ExitCode::FAILURE
             }
         },
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(2)
         }
     }

@@ -12,11 +12,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod terminal;
+
 use std::cell::Cell;
 use std::io::{self, Read as _, Write as _};
 use std::panic::{UnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
+
+pub use terminal::{print, say, show};
 
 /// What to do with a file that is already there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,24 +48,6 @@ impl Error {
     fn at<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) -> Self + use<'a> {
         move |source| Self { action, path: path.to_path_buf(), source }
     }
-}
-
-/// Prints to standard output. A reader that has seen enough, and closed the pipe, is no error.
-///
-/// # Errors
-///
-/// Where the output cannot be written, as on a full disk.
-pub fn print(text: &str) -> io::Result<()> {
-    let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        printed => printed,
-    }
-}
-
-/// Says something on standard error, where anybody listens.
-pub fn say(text: &str) {
-    let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
 /// Writes `bytes` to a hidden temporary file beside `path`, syncs it, gives it its name and syncs the folder, which must exist. Returns

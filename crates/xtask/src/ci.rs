@@ -14,7 +14,7 @@ pub(crate) fn run() -> Result<ExitCode> {
         &["test", "--release", "--workspace"],
     ];
     for step in steps {
-        eprintln!("cargo {}", step.join(" "));
+        whole_file::say!("cargo {}", step.join(" "));
         if !cargo(&root).args(step).status().context("cannot run cargo")?.success() {
             return Ok(ExitCode::FAILURE);
         }

@@ -2,7 +2,6 @@
 
 mod help;
 
-use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command as Process, ExitCode};
 
@@ -66,7 +65,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
     let (mut menu, mut missing) = menu(|verb| path(if verb == "rerun" { VIEWER } else { verb }));
     missing.retain(|verb| verb != "rerun");
     if !missing.is_empty() {
-        eprintln!("not built, so without their options: {}", missing.join(", "));
+        whole_file::say!("not built, so without their options: {}", missing.join(", "));
     }
     let mut script = Vec::new();
     clap_complete::generate(options.shell, &mut menu, NAME, &mut script);
@@ -76,7 +75,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
         _ => "",
     };
     script.extend(more.as_bytes());
-    std::io::stdout().write_all(&script)?;
+    whole_file::show(&String::from_utf8_lossy(&script));
     Ok(ExitCode::SUCCESS)
 }
 

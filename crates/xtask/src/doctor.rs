@@ -85,7 +85,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
     checks.extend(priors::checks(&root));
     checks.extend(tools::optional(&root, &options.python));
     let good = checks.iter().all(|check| check.state == State::Ok || !check.required);
-    print!("{}", if options.json { as_json(&checks, good) } else { as_text(&checks) });
+    whole_file::show(&if options.json { as_json(&checks, good) } else { as_text(&checks) });
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 

@@ -44,7 +44,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             let wrote = matches!(error.downcast_ref(), Some(measured_log::Error::Write { .. }));
             ExitCode::from(if wrote || error.is::<whole_file::Error>() { 1 } else { 2 })
         }
@@ -68,6 +68,6 @@ fn run(arguments: &Arguments) -> Result<()> {
     let model = ModelFile::of_effects(problem.scenario.effects.model.clone()).to_toml()?;
     whole_file::write(&arguments.out.join("model.toml"), model.as_bytes(), Existing::Replace)?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
-    println!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
+    whole_file::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
     Ok(())
 }

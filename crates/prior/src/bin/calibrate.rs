@@ -44,7 +44,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            whole_file::say!("error: {error:#}");
             ExitCode::from(2)
         }
     }
@@ -123,28 +123,34 @@ fn run(arguments: &Arguments) -> Result<()> {
         figure.save(&out.join(name))?;
     }
     if arguments.json {
-        println!("{}", serde_json::to_string(&calibration)?);
+        whole_file::out!("{}", serde_json::to_string(&calibration)?);
     } else {
         print(&calibration);
-        println!("{}", out.join("calibration.json").display());
+        whole_file::out!("{}", out.join("calibration.json").display());
     }
     Ok(())
 }
 
 fn print(calibration: &Calibration) {
     let Calibration { episodes, steps, nll, baseline_nll, .. } = calibration;
-    println!(
+    whole_file::out!(
         "{episodes} episodes, {steps} steps; nats a step: network {nll:.2}, sampling distribution {baseline_nll:.2}"
     );
     if let Some(memoryless) = calibration.memoryless_nll {
-        println!("the same network without memory: {memoryless:.2}");
+        whole_file::out!("the same network without memory: {memoryless:.2}");
     }
-    println!(
+    whole_file::out!(
         "\n{:<20} {:>8} {:>7} {:>7} {:>6} {:>9} {:>8}",
-        "parameter", "episodes", "50 %", "90 %", "±", "90 % last", "touched"
+        "parameter",
+        "episodes",
+        "50 %",
+        "90 %",
+        "±",
+        "90 % last",
+        "touched"
     );
     for parameter in calibration.parameters.iter().filter(|p| calibration.static_targets.contains(&p.name)) {
-        println!(
+        whole_file::out!(
             "{:<20} {:>8} {:>7.3} {:>7.3} {:>6.3} {:>9.3} {:>8.3}",
             parameter.name,
             parameter.episodes,
@@ -155,28 +161,31 @@ fn print(calibration: &Calibration) {
             parameter.coverage90_last_touched.unwrap_or(f64::NAN),
         );
     }
-    println!();
+    whole_file::out!("");
     for class in &calibration.classes {
-        println!(
+        whole_file::out!(
             "{}: right at the last step in {:.3}, expected calibration error {:.3}, confusion {:?}",
-            class.name, class.last_accuracy, class.expected_calibration_error, class.last_confusion
+            class.name,
+            class.last_accuracy,
+            class.expected_calibration_error,
+            class.last_confusion
         );
     }
     if let Some(found) = calibration.obstacle_after_contact_accuracy {
         let touched = calibration.obstacle_contact_episodes;
         let denied = calibration.no_obstacle_accuracy.unwrap_or(f64::NAN);
-        println!(
+        whole_file::out!(
             "obstacle found in {found:.3} of {touched} episodes that touched it, denied in {denied:.3} without one"
         );
         let since: Vec<String> = calibration.obstacle_found_since_touch.iter().map(|f| format!("{f:.2}")).collect();
         let untouched = calibration.untouched_obstacle_found.unwrap_or(f64::NAN);
-        println!("by steps since the touch: {}; of those that nothing touched {untouched:.3}", since.join(" "));
+        whole_file::out!("by steps since the touch: {}; of those that nothing touched {untouched:.3}", since.join(" "));
     }
-    println!("\nsteps since the first contact, nats of Θ: network, sampling distribution, without memory");
+    whole_file::out!("\nsteps since the first contact, nats of Θ: network, sampling distribution, without memory");
     for report in calibration.sharpening.iter().filter(|r| r.since_contact.count > 0) {
         let score = &report.since_contact;
         let memoryless = score.static_nll.memoryless.map_or(String::new(), |nll| format!("{nll:>8.2}"));
-        println!(
+        whole_file::out!(
             "{:>4} {:>7} {:>8.2} {:>8.2} {memoryless}",
             report.step,
             score.count,

@@ -65,7 +65,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            whole_file::say(&format!("error: {error:#}"));
+            whole_file::say!("error: {error:#}");
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -108,7 +108,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         whole_file::print(&format!("{}\n", serde_json::to_string(&record)?)).context(Failed)?;
     } else {
         whole_file::print(&describe::summary(&trace, &record)).context(Failed)?;
-        whole_file::say(&format!("written to {}: episode.png, episode.html, trace.json", out.display()));
+        whole_file::say!("written to {}: episode.png, episode.html, trace.json", out.display());
     }
     Ok(())
 }

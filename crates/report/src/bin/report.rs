@@ -23,7 +23,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            whole_file::say(&format!("error: {error:#}"));
+            whole_file::say!("error: {error:#}");
             ExitCode::from(2)
         }
     }
@@ -46,6 +46,6 @@ fn run(arguments: &Arguments) -> Result<()> {
     let out = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
     whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace)
         .with_context(|| format!("cannot write {}", out.display()))?;
-    whole_file::say(&format!("written to {}", out.display()));
+    whole_file::say!("written to {}", out.display());
     Ok(())
 }

@@ -1,0 +1,41 @@
+//! What programs say: a closed pipe is a reader who has seen enough.
+
+use std::io::{self, Write as _};
+
+/// Prints to standard output. A reader that has seen enough, and closed the pipe, is no error.
+///
+/// # Errors
+///
+/// Where the output cannot be written, as on a full disk.
+pub fn print(text: &str) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        printed => printed,
+    }
+}
+
+/// The same as the last thing that a program does: where the output cannot be written it says so and ends with exit code 1.
+pub fn show(text: &str) {
+    if let Err(error) = print(text) {
+        say(&format!("error: cannot print: {error}"));
+        std::process::exit(1);
+    }
+}
+
+/// Says something on standard error, where anybody listens.
+pub fn say(text: &str) {
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// [`show`] of a line, as `println!` formats it.
+#[macro_export]
+macro_rules! out {
+    ($($argument:tt)*) => { $crate::show(&(::std::format!($($argument)*) + "\n")) };
+}
+
+/// [`say`](fn@say), as `eprintln!` formats it.
+#[macro_export]
+macro_rules! say {
+    ($($argument:tt)*) => { $crate::say(&::std::format!($($argument)*)) };
+}
