@@ -1,10 +1,10 @@
 //! The crate table of ARCHITECTURE.md against the manifests.
 
 use std::collections::{BTreeMap, BTreeSet};
-
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use end_to_end::{root, stderr};
+use end_to_end::{files, root, stderr};
 use serde_json::Value;
 
 /// Packages with programs that do not train.
@@ -95,6 +95,49 @@ fn programs_that_are_built_one_by_one_share_their_dependencies_and_do_without_bu
         assert!(!some.keys().any(|name| name.starts_with("burn")), "{program} compiles burn");
         for (name, features) in &base {
             assert_eq!(some.get(name), Some(features), "{name}, with {program}");
+        }
+    }
+}
+
+/// All source files below a folder, with their text.
+fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
+    let rust = |path: &PathBuf| path.extension().is_some_and(|end| end == "rs");
+    let paths = files(folder).into_iter().filter(|(path, _)| rust(path));
+    paths.map(|(path, bytes)| (path, String::from_utf8(bytes).unwrap())).collect()
+}
+
+#[test]
+fn programs_print_where_a_closed_pipe_is_no_panic() {
+    let mut read = 0;
+    for (path, text) in sources(&root().join("crates")) {
+        let program = path.iter().nth(1).is_some_and(|folder| folder == "src");
+        if program {
+            let found = ["println!(", "print!("].iter().find(|name| text.contains(*name));
+            assert!(found.is_none(), "{}: {found:?} instead of whole_file::out! or say!", path.display());
+            read += 1;
+        }
+    }
+    assert!(read > 200, "{read} files");
+}
+
+#[test]
+fn files_and_functions_stay_small() {
+    for folder in ["crates", "tests"] {
+        for (path, text) in sources(&root().join(folder)) {
+            let lines: Vec<&str> = text.lines().collect();
+            assert!(lines.len() <= 500, "{}: {} lines", path.display(), lines.len());
+            for (first, line) in lines.iter().enumerate() {
+                let code = line.trim_start();
+                let begins =
+                    ["fn ", "pub fn ", "pub(crate) fn ", "pub(super) fn "].iter().any(|word| code.starts_with(word));
+                let end = format!("{}}}", &line[..line.len() - code.len()]);
+                let length = lines[first..].iter().position(|line| *line == end).map_or(0, |last| last + 1);
+                // A declaration without a body ends elsewhere.
+                let declared = lines[first..].iter().take(12).position(|line| line.ends_with(';'));
+                let body = lines[first..].iter().take(12).position(|line| line.ends_with('{') || line.ends_with('}'));
+                let has_body = body.is_some_and(|body| declared.is_none_or(|declared| body <= declared));
+                assert!(!begins || !has_body || length <= 80, "{}: {code} has {length} lines", path.display());
+            }
         }
     }
 }

@@ -55,6 +55,16 @@ struct Streams {
     suggestion: Rng,
 }
 
+impl Streams {
+    fn of(seed: Seed) -> Self {
+        Self {
+            search: seed.stream(Purpose::Search, 0),
+            filter: seed.stream(Purpose::Filter, 0),
+            suggestion: seed.stream(Purpose::Suggestion, 0),
+        }
+    }
+}
+
 impl<'a> Agent<'a> {
     /// An agent for `problem`.
     ///
@@ -101,11 +111,7 @@ impl<'a> Agent<'a> {
     ) -> Result<Episode, Error> {
         let horizon = self.problem.scenario.task.horizon;
         let model = &self.problem.model;
-        let mut streams = Streams {
-            search: seed.stream(Purpose::Search, 0),
-            filter: seed.stream(Purpose::Filter, 0),
-            suggestion: seed.stream(Purpose::Suggestion, 0),
-        };
+        let mut streams = Streams::of(seed);
         let (mut observation, mut joints_rad) = match world.reset() {
             Err(Error::World(error)) => return Ok(Episode::failed(sentence(&error))),
             reset => reset?,
@@ -117,13 +123,8 @@ impl<'a> Agent<'a> {
         let mut mind = self.first_mind(&observation, seed)?;
         let mut belief_errors = BeliefErrors::default();
         mind.note_errors(world, &mut belief_errors);
-        watcher.see(&Glimpse {
-            joints_rad: &joints_rad,
-            truth: world.truth(),
-            belief: mind.belief(),
-            search: None,
-            step: None,
-        });
+        let (truth, belief) = (world.truth(), mind.belief());
+        watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief, search: None, step: None });
         let mut object_moved = false;
         let mut steps: Vec<StepRecord> = Vec::new();
         let mut depletions = 0;
@@ -144,32 +145,22 @@ impl<'a> Agent<'a> {
             record.note_answer(&answer);
             observation = answer.observation;
             joints_rad = answer.joints_rad;
-            match answer.outcome {
-                Outcome::Terminal => reason = Reason::Goal,
-                Outcome::Diverged => reason = Reason::Diverged,
-                Outcome::Continue => {}
-            }
-            let search = search.as_ref();
-            if answer.outcome != Outcome::Continue {
-                let truth = world.truth();
-                watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief: None, search, step: Some(&record) });
-                steps.push(record);
-                break;
-            }
             let context = Context { model, observation: &observation, joints_rad: &joints_rad, object_moved };
-            let Some(next) = self.learn(mind, &mut record, &context, &mut streams)? else {
-                depletions += 1;
-                let truth = world.truth();
-                watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief: None, search, step: Some(&record) });
-                steps.push(record);
-                reason = Reason::Depleted;
-                break;
+            let next = self.carry_on(mind, &mut record, answer.outcome, &context, &mut streams)?;
+            let (truth, belief) = (world.truth(), next.as_ref().ok().and_then(Mind::belief));
+            let search = search.as_ref();
+            watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief, search, step: Some(&record) });
+            mind = match next {
+                Ok(next) => next,
+                Err(end) => {
+                    depletions += usize::from(end == Reason::Depleted);
+                    reason = end;
+                    steps.push(record);
+                    break;
+                }
             };
-            mind = next;
             mind.note_errors(world, &mut belief_errors);
             depletions += usize::from(record.update.as_ref().is_some_and(|u| u.acceptance == 0.0 || u.recoveries > 0));
-            let (truth, belief) = (world.truth(), mind.belief());
-            watcher.see(&Glimpse { joints_rad: &joints_rad, truth, belief, search, step: Some(&record) });
             tracing::debug!(
                 time,
                 action = record.action.index(),
@@ -185,6 +176,22 @@ impl<'a> Agent<'a> {
         let discounted_return = discounted_return(rewards, self.problem.scenario.task.discount);
         let belief_errors = (!belief_errors.is_empty()).then_some(belief_errors);
         Ok(Episode { reason, discounted_return, depletions, steps, belief_errors, failure })
+    }
+
+    /// What the agent carries on with after an answer; why the episode ends, where it does.
+    fn carry_on<'m>(
+        &mut self,
+        mind: Mind<'m>,
+        record: &mut StepRecord,
+        outcome: Outcome,
+        context: &Context<'_>,
+        streams: &mut Streams,
+    ) -> Result<Result<Mind<'m>, Reason>, Error> {
+        Ok(match outcome {
+            Outcome::Terminal => Err(Reason::Goal),
+            Outcome::Diverged => Err(Reason::Diverged),
+            Outcome::Continue => self.learn(mind, record, context, streams)?.ok_or(Reason::Depleted),
+        })
     }
 
     /// What the agent carries on after an action and its observation; `None` where no particle is left.

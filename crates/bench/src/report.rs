@@ -51,7 +51,7 @@ pub fn page(root: &Path, world: &WorldConfig) -> Result<String> {
     let errors = |world: &WorldConfig| -> Vec<SceneError> {
         scenes.iter().map(|(scene, theirs)| compare(scene, theirs, world)).collect()
     };
-    let ours = errors(world);
+    let (ours, fine) = (errors(world), errors(&finest(world)));
     let mut page = String::new();
     let _ = writeln!(page, "<!-- Written by `cargo xtask bench accuracy --write`; do not edit. -->\n");
     let _ = writeln!(
@@ -64,19 +64,7 @@ pub fn page(root: &Path, world: &WorldConfig) -> Result<String> {
         world.contact_frequency_hz,
         world.contact_damping_ratio
     );
-    let _ =
-        writeln!(page, "## Closed forms\n\n| quantity | closed form | MuJoCo | ours | error |\n|---|---|---|---|---|");
-    for m in measure(root, world)? {
-        let reference = m.exact.unwrap_or(m.mujoco);
-        let exact = m.exact.map_or("–".into(), |v| format!("{v:.4}"));
-        let error = 100.0 * (m.ours / reference - 1.0);
-        let _ = writeln!(page, "| {} | {exact} | {:.4} | {:.4} | {error:+.1} % |", m.text, m.mujoco, m.ours);
-    }
-    let _ = writeln!(
-        page,
-        "\nA body that friction stops ends v h / 2 short (h: substep), because its position follows the speed at the end of each substep: \
-         3.3 % of the slide and 11.6 % of the spin.\n"
-    );
+    page += &closed_forms(root, world)?;
     let _ = writeln!(
         page,
         "## {} scenes, one 2 cm action each\n\nDistance and angle between where we and MuJoCo leave the object; length of the difference of the mean \
@@ -93,47 +81,58 @@ pub fn page(root: &Path, world: &WorldConfig) -> Result<String> {
         };
         let chosen = (steps, iterations) == (world.control_steps, world.solver_iterations);
         let mark = if chosen { "**" } else { "" };
-        let s = summarise(&errors(&base));
-        let _ = writeln!(
-            page,
-            "| {mark}{steps} × {iterations}{mark} | {:.2} / {:.2} | {:.2} / {:.2} | {:.1} / {:.1} |",
-            s.position_mm[0],
-            s.position_mm[1],
-            s.angle_deg[0],
-            s.angle_deg[1],
-            100.0 * s.force[0],
-            100.0 * s.force[1]
-        );
+        page += &row(&format!("{mark}{steps} × {iterations}{mark}"), &errors(&base));
     }
-    let fine = errors(&WorldConfig {
+    page += &row(&format!("{} × 8, 200 Hz contacts", 8 * world.control_steps), &fine);
+    page += &outliers(&ours, &fine);
+    Ok(page)
+}
+
+/// The finest settings that are shown.
+fn finest(world: &WorldConfig) -> WorldConfig {
+    WorldConfig {
         control_steps: 8 * world.control_steps,
         control_period_secs: world.control_period_secs / 8.0,
         solver_iterations: 8,
         contact_frequency_hz: 200.0,
         ..world.clone()
-    });
-    let s = summarise(&fine);
-    let _ = writeln!(
-        page,
-        "| {} × 8, 200 Hz contacts | {:.2} / {:.2} | {:.2} / {:.2} | {:.1} / {:.1} |",
-        8 * world.control_steps,
-        s.position_mm[0],
-        s.position_mm[1],
-        s.angle_deg[0],
-        s.angle_deg[1],
-        100.0 * s.force[0],
-        100.0 * s.force[1]
-    );
-    let _ = writeln!(
-        page,
+    }
+}
+
+fn closed_forms(root: &Path, world: &WorldConfig) -> Result<String> {
+    let mut page =
+        String::from("## Closed forms\n\n| quantity | closed form | MuJoCo | ours | error |\n|---|---|---|---|---|\n");
+    for m in measure(root, world)? {
+        let reference = m.exact.unwrap_or(m.mujoco);
+        let exact = m.exact.map_or("–".into(), |v| format!("{v:.4}"));
+        let error = 100.0 * (m.ours / reference - 1.0);
+        let _ = writeln!(page, "| {} | {exact} | {:.4} | {:.4} | {error:+.1} % |", m.text, m.mujoco, m.ours);
+    }
+    page += "\nA body that friction stops ends v h / 2 short (h: substep), because its position follows the speed at the end of each substep: \
+             3.3 % of the slide and 11.6 % of the spin.\n\n";
+    Ok(page)
+}
+
+/// Medians and 90th percentiles as a row.
+fn row(settings: &str, errors: &[SceneError]) -> String {
+    let Summary { position_mm, angle_deg, force } = summarise(errors);
+    let [force, high] = force.map(|force| 100.0 * force);
+    format!(
+        "| {settings} | {:.2} / {:.2} | {:.2} / {:.2} | {force:.1} / {high:.1} |\n",
+        position_mm[0], position_mm[1], angle_deg[0], angle_deg[1]
+    )
+}
+
+fn outliers(ours: &[SceneError], fine: &[SceneError]) -> String {
+    let mut page = format!(
         "\n## Outliers\n\nScenes beyond {} mm, {}° or {:.0} %, with their errors at the finest settings above: what shrinks there is the time step, what stays \
-         is a difference of the engines.\n\n| scene | position, mm | angle, ° | force, % | fine: position, mm | angle, ° | force, % |\n|---|---|---|---|---|---|---|",
+         is a difference of the engines.\n\n| scene | position, mm | angle, ° | force, % | fine: position, mm | angle, ° | force, % |\n|---|---|---|---|---|---|---|\n",
         OUTLIER.0,
         OUTLIER.1,
         100.0 * OUTLIER.2
     );
     let percent = |force: Option<f64>| force.map_or("–".into(), |f| format!("{:.0}", 100.0 * f));
-    for (error, fine) in ours.iter().zip(&fine) {
+    for (error, fine) in ours.iter().zip(fine) {
         let force = error.force.unwrap_or(0.0);
         if error.position_mm > OUTLIER.0 || error.angle_deg > OUTLIER.1 || force > OUTLIER.2 {
             let _ = writeln!(
@@ -149,5 +148,5 @@ pub fn page(root: &Path, world: &WorldConfig) -> Result<String> {
             );
         }
     }
-    Ok(page)
+    page
 }

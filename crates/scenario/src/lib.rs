@@ -11,6 +11,7 @@
 //! ```
 
 mod assemble;
+mod check;
 mod error;
 mod explain;
 mod file_schema;

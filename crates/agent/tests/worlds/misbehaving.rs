@@ -78,6 +78,9 @@ fn observation(hello: &Value) -> Value {
 
 /// Spoils `answer`, or returns the text to send in its place, or never returns.
 fn misbehave(fault: &str, answer: &mut Value) -> Option<String> {
+    if spoil(fault, answer) {
+        return None;
+    }
     let number = |text: &str| Some(format!("{{\"act\":{{\"step\":1,\"observation\":[0,0,{text},0]}}}}"));
     match fault {
         "" => {}
@@ -132,6 +135,14 @@ fn misbehave(fault: &str, answer: &mut Value) -> Option<String> {
         }
         "other-name" => return Some(json!({"reset": answer}).to_string()),
         "error" => return Some(json!({"error": {"message": "the gripper\nis open"}}).to_string()),
+        other => panic!("no such fault: {other}"),
+    }
+    None
+}
+
+/// Changes a value of `answer`; false where the fault is another one.
+fn spoil(fault: &str, answer: &mut Value) -> bool {
+    match fault {
         "short" => {
             answer["observation"].as_array_mut().expect("values").pop();
         }
@@ -188,9 +199,9 @@ fn misbehave(fault: &str, answer: &mut Value) -> Option<String> {
         "version" => answer["protocol"] = json!(2),
         "robot" => answer["robot"] = json!("panda"),
         "name" => answer["world"] = json!("../../etc/passwd"),
-        other => panic!("no such fault: {other}"),
+        _ => return false,
     }
-    None
+    true
 }
 
 /// Closes standard output and keeps the process.

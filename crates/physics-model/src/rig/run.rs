@@ -105,22 +105,10 @@ impl<'a> Run<'a> {
         check_place(first_m)?;
         let mut drive = Drive::new(effects.list, first_m, tick_secs, postures)?;
         let mut motion = ToolMotion::new(first_m, tick_secs);
-        let mut arm = None;
         let (past, lead_commands) = start.earlier_commands.split_at(start.earlier_commands.len() - lead);
-        let mut sent_m = first_m;
         // Without a tool they are only counted.
         let past = if matches!(rig.tool, RigTool::None) { &[] } else { past };
-        for (i, command) in past.iter().enumerate() {
-            check_place(*command)?;
-            sent_m = drive.follow(*command)?;
-            motion.acceleration(sent_m);
-            if i + MOTION_TICKS >= past.len() {
-                arm = ArmMotion::follow(arm, postures, &drive, sent_m, tick_secs)?;
-            }
-        }
-        if arm.is_none() {
-            arm = ArmMotion::follow(None, postures, &drive, sent_m, tick_secs)?;
-        }
+        let (sent_m, arm) = follow_past(past, first_m, (&mut drive, &mut motion), postures, tick_secs)?;
 
         let measured_m = start.tool_m.filter(|_| lead == 0).unwrap_or(sent_m);
         let orientation = postures.map_or([0.0, 0.0, 0.0, 1.0], |postures| {
@@ -227,6 +215,29 @@ impl<'a> Run<'a> {
         }
         Ok(reading)
     }
+}
+
+/// Follows commands that were given before the run begins. Where the tool is sent then, m, and how the arm moves there.
+fn follow_past<'a>(
+    past: &[[f64; 3]],
+    first_m: [f64; 3],
+    (drive, motion): (&mut Drive<'a>, &mut ToolMotion),
+    postures: Option<Postures<'a>>,
+    tick_secs: f64,
+) -> Result<([f64; 3], Option<ArmMotion<'a>>), Stop> {
+    let (mut sent_m, mut arm) = (first_m, None);
+    for (i, command) in past.iter().enumerate() {
+        check_place(*command)?;
+        sent_m = drive.follow(*command)?;
+        motion.acceleration(sent_m);
+        if i + MOTION_TICKS >= past.len() {
+            arm = ArmMotion::follow(arm, postures, drive, sent_m, tick_secs)?;
+        }
+    }
+    if arm.is_none() {
+        arm = ArmMotion::follow(None, postures, drive, sent_m, tick_secs)?;
+    }
+    Ok((sent_m, arm))
 }
 
 impl<'a> ArmMotion<'a> {
