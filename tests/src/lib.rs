@@ -30,8 +30,10 @@ pub fn program(binary: &str) -> Command {
         command.status().is_ok_and(|status| status.success())
     });
     assert!(built, "{binary} does not build");
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
-    let mut command = Command::new(target.join("release").join(binary));
+    // Beside this test's own folder, wherever cargo was told to build.
+    let deps = std::env::current_exe().expect("a test knows where it is");
+    let release = deps.ancestors().nth(2).expect("a test is built into a folder of its profile");
+    let mut command = Command::new(release.join(binary));
     command.current_dir(&root);
     command
 }

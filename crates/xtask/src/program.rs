@@ -68,7 +68,13 @@ fn build_and_become(selection: &[&str], binary: &str, arguments: &[String]) -> R
 
 /// Where a release program is or will be.
 pub(crate) fn path(binary: &str) -> PathBuf {
-    target(&root()).join("release").join(binary).with_extension(std::env::consts::EXE_EXTENSION)
+    folder().join(binary).with_extension(std::env::consts::EXE_EXTENSION)
+}
+
+/// Where cargo puts release programs, wherever it was told to build: this one is one of them.
+pub(crate) fn folder() -> PathBuf {
+    let own = std::env::current_exe().unwrap_or_default();
+    own.parent().map_or_else(|| root().join("target/release"), Path::to_path_buf)
 }
 
 pub(crate) fn cargo(root: &Path) -> Command {
@@ -81,9 +87,4 @@ pub(crate) fn cargo(root: &Path) -> Command {
 pub(crate) fn root() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.ancestors().nth(2).unwrap_or(package).to_path_buf()
-}
-
-/// Where cargo builds.
-pub(crate) fn target(root: &Path) -> PathBuf {
-    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
 }
