@@ -1,6 +1,7 @@
 //! What the documents tell people to type works: every option exists, and what takes seconds is played, with small budgets and in a folder
 //! of its own.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use end_to_end::{program, root, stderr};
@@ -23,6 +24,13 @@ fn commands(document: &Path) -> Vec<String> {
         }
     }
     found
+}
+
+/// The same within sentences, between backticks.
+fn mentioned(document: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(document).unwrap_or_else(|e| panic!("{}: {e}", document.display()));
+    let spans = text.split('`').skip(1).step_by(2);
+    spans.filter_map(|span| span.strip_prefix("cargo xtask ")).map(|command| command.replace('\n', " ")).collect()
 }
 
 /// Words as a shell splits them.
@@ -67,15 +75,16 @@ fn documents() -> Vec<PathBuf> {
 fn every_option_in_the_documents_exists() {
     let mut checked = 0;
     for document in documents() {
-        for command in commands(&document) {
+        for command in commands(&document).into_iter().chain(mentioned(&document)) {
             let verb = words(&command)[0].clone();
-            if NOT_HERE.contains(&verb.as_str()) {
+            if NOT_HERE.contains(&verb.as_str()) || verb == "VERB" {
                 continue;
             }
             let text = help(&verb);
+            let known: BTreeSet<&str> = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '-').collect();
             for option in command.split([' ', '[', ']', '|']).filter(|word| word.starts_with("--")) {
                 let option = option.split('=').next().unwrap_or(option);
-                assert!(text.contains(option), "{}: {verb} has no {option}", document.display());
+                assert!(known.contains(option), "{}: {verb} has no {option}", document.display());
                 checked += 1;
             }
         }
@@ -127,17 +136,24 @@ fn copy_of_the_project() -> tempfile::TempDir {
     folder
 }
 
-/// Played in order, so that a command finds what those above it left.
 fn play(document: &str) {
+    // Models that only `diagnose` leaves.
+    play_with(document, &PLAYED_ELSEWHERE, &["model.toml"]);
+}
+
+/// Plays commands in order, so that one finds what those above it left, but for some verbs and for what has `lacking` in it. The folder that it
+/// happened in.
+pub(crate) fn play_with(document: &str, but: &[&str], lacking: &[&str]) -> tempfile::TempDir {
     let project = copy_of_the_project();
     let mut played = 0;
     for command in commands(&root().join(document)) {
         let all = words(&command);
         let (verb, rest) = (all[0].as_str(), &all[1..]);
-        let heavy = PLAYED_ELSEWHERE.contains(&verb) || NOT_HERE.contains(&verb);
-        // An engine, another simulator, a robot behind a socket, and models that only `diagnose` leaves.
-        let absent = ["slurm", "hq", "mujoco_jaco.py", "tcp://127.0.0.1:5555", "model.toml"];
-        if heavy || is_synopsis(&command) || absent.iter().any(|part| command.contains(part)) {
+        let left_out = but.contains(&verb) || NOT_HERE.contains(&verb);
+        // An engine, another simulator, a robot behind a socket.
+        let absent = ["slurm", "hq", "mujoco_jaco.py", "tcp://127.0.0.1:5555"];
+        let lacks = absent.iter().chain(lacking).any(|part| command.contains(part));
+        if left_out || is_synopsis(&command) || lacks {
             continue;
         }
         let mut program = tool(verb);
@@ -158,6 +174,7 @@ fn play(document: &str) {
         played += 1;
     }
     assert!(played > 0, "{document}: nothing was played");
+    project
 }
 
 #[test]
