@@ -12,6 +12,8 @@ use crate::obstacle::Place;
 
 /// Of the distance from the neutral to the farthest plausible value: one standard deviation of the prior of a strength.
 const STRENGTH_SHARE: f64 = 1.0 / 1.5;
+/// Places of a patch that are tried.
+const PATCHES: usize = 6;
 /// Standard deviation of where something is, m, around the place that a fit begins from.
 const PLACE_M: f64 = 0.05;
 
@@ -26,6 +28,8 @@ pub struct Context {
     pub places_m: Vec<[f64; 2]>,
     /// Where something may stand in the way.
     pub obstacles_m: Vec<Place>,
+    /// Where the table may be rougher or smoother, as forces say; none without them.
+    pub patches_m: Vec<Place>,
     /// Largest force that was read, N; 0 without a sensor.
     pub largest_force_n: f64,
     /// Whether there is a tool that is commanded.
@@ -139,10 +143,16 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         Candidate { coordinates: coordinates(&base, context), base, begin: None }
     };
     match kind {
-        // Both harmonics of the direction.
-        EffectKind::AnisotropicFriction => vec![with(&[(1, 0.0)]), with(&[(1, std::f64::consts::FRAC_PI_4)])],
+        // Both harmonics of the direction, either sign: the amplitude has none.
+        EffectKind::AnisotropicFriction => {
+            (0..4).map(|eighth| with(&[(1, f64::from(eighth) * std::f64::consts::FRAC_PI_4)])).collect()
+        }
         EffectKind::FrictionPatch => {
-            context.places_m.iter().map(|[x, y]| with(&[(1, *x), (2, *y), (3, 0.05)])).collect()
+            let anywhere = context.places_m.iter().map(|place| (*place, 0.05));
+            (context.patches_m.iter().copied().chain(anywhere))
+                .take(PATCHES)
+                .map(|([x, y], radius_m)| with(&[(1, x), (2, y), (3, radius_m)]))
+                .collect()
         }
         // In the middle and to all sides of it: where an object is pulled to from everywhere, or pushed along by.
         EffectKind::Tether => {
@@ -280,6 +290,7 @@ mod tests {
             theta: Theta { object, obstacle: None, effects: Vec::new() },
             places_m: vec![[0.4, 0.0]],
             obstacles_m: vec![([0.5, 0.1], 0.03)],
+            patches_m: vec![([0.4, 0.1], 0.09)],
             largest_force_n: 10.0,
             tool: true,
             forces: true,

@@ -8,6 +8,7 @@ use crate::candidate::Context;
 use crate::fit::Fit;
 use crate::noise::NoiseLevels;
 use crate::obstacle::{self, Outlines, Place, distance};
+use crate::patch;
 use crate::simulator::{Nudge, Simulator};
 use crate::trial::{Kind, Trial};
 
@@ -18,6 +19,8 @@ const APART_M: f64 = 0.03;
 const MOVED_M: f64 = 0.01;
 /// Places that are tried for an obstacle.
 const OBSTACLES: usize = 5;
+/// The same for a patch.
+const PATCHES: usize = 4;
 
 /// Where the object went and what the log has.
 pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
@@ -39,12 +42,13 @@ pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &Nois
             }
         }
     }
-    let obstacles_m = obstacles(simulator, null, &theta.object);
+    let (obstacles_m, patches_m) = placed(simulator, null, &theta.object);
     Context {
         world,
         theta,
         places_m: centres(&path, PLACES),
         obstacles_m,
+        patches_m,
         largest_force_n,
         tool: nominal.has_tool(),
         forces: has(Kind::WristForce) || has(Kind::JointTorque),
@@ -69,8 +73,8 @@ fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
     centres
 }
 
-/// Places at which something may stand in the way.
-fn obstacles(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> Vec<Place> {
+/// Places at which something may stand in the way, and where the table may be rougher or smoother.
+fn placed(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<Place>) {
     let hypothesis = null.model.hypothesis(&null.x);
     let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
     let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
@@ -80,5 +84,5 @@ fn obstacles(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> Vec<Pla
         object_m: object.shape.footprint_radius_m(object.size_m),
         tool_m: simulator.nominal.header().tool_radius_m.unwrap_or(0.0),
     };
-    obstacle::places(&courses, outlines, OBSTACLES)
+    (obstacle::places(&courses, outlines, OBSTACLES), patch::places(&courses, PATCHES))
 }

@@ -65,8 +65,8 @@ impl Default for Settings {
             threshold_rolling: 20.0,
             effects: 2,
             rollouts: 3900,
-            most: 4300,
-            limit: 4750,
+            most: 4200,
+            limit: 4600,
             unexplained: 1.4,
             gap: 1.1,
             // At most 1.6 in the 38 logs without an effect of seeds 101, 103 and 106.

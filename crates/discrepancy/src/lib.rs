@@ -34,6 +34,7 @@ pub mod noise;
 pub mod nominal;
 pub mod obstacle;
 mod page;
+mod patch;
 pub mod report;
 pub mod screen;
 pub mod separate;

@@ -149,7 +149,8 @@ fn witness(rows: &[Happened], outlines: Outlines) -> Witness {
     Witness { before: averaged[..end].to_vec(), event }
 }
 
-fn average(rows: &[Happened]) -> Happened {
+/// The mean of rows.
+pub(crate) fn average(rows: &[Happened]) -> Happened {
     let mean = |pick: &dyn Fn(&Happened) -> [f64; 2]| {
         let sum = rows.iter().map(pick).fold([0.0; 2], |sum, point| [sum[0] + point[0], sum[1] + point[1]]);
         sum.map(|sum| sum / rows.len() as f64)
@@ -160,6 +161,7 @@ fn average(rows: &[Happened]) -> Happened {
         yaw_rad: rows[rows.len() / 2].yaw_rad,
         tool: rows[0].tool.map(|first| mean(&|row| row.tool.unwrap_or(first))),
         surprise_n: mean(&|row| row.surprise_n),
+        force_n: mean(&|row| row.force_n),
     }
 }
 
@@ -190,7 +192,7 @@ pub(crate) fn distance([ax, ay]: [f64; 2], [bx, by]: [f64; 2]) -> f64 {
 }
 
 /// Corners of the smallest rectangle around points, wider by `around_m`.
-fn corners(points: impl Iterator<Item = [f64; 2]>, around_m: f64) -> Option<([f64; 2], [f64; 2])> {
+pub(crate) fn corners(points: impl Iterator<Item = [f64; 2]>, around_m: f64) -> Option<([f64; 2], [f64; 2])> {
     let wide = |corners: Option<([f64; 2], [f64; 2])>, [x, y]: [f64; 2]| {
         let (low, high) = corners.unwrap_or(([x, y], [x, y]));
         Some(([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]))
@@ -219,6 +221,7 @@ mod tests {
                     yaw_rad,
                     tool: Some(at(along - 0.06)),
                     surprise_n: [0.0; 2],
+                    force_n: [0.0; 2],
                 };
                 if body.is_none_or(|(place, radius_m)| OUTLINES.off_object(place, &here(simulated)) > radius_m) {
                     last = simulated;

@@ -280,6 +280,8 @@ pub(crate) struct Happened {
     pub(crate) tool: Option<[f64; 2]>,
     /// Force on the tool as measured, less that as simulated, N; 0 without a sensor.
     pub(crate) surprise_n: [f64; 2],
+    /// Force on the tool as simulated, N.
+    pub(crate) force_n: [f64; 2],
 }
 
 impl Trial {
@@ -304,6 +306,7 @@ impl Trial {
                     yaw_rad: orientation(reading).euler_angles().2,
                     tool: reading.tool_m.map(|[x, y, _]| [x, y]),
                     surprise_n: read(&force, row).map_or([0.0; 2], |[x, y]| [x - fx, y - fy]),
+                    force_n: [fx, fy],
                 })
             })
             .collect()
