@@ -112,8 +112,10 @@ pub struct Scene {
     pub period_secs: f64,
     /// Height of the tool's centre while it pushes, m.
     pub tool_height_m: f64,
-    /// From the object's centre to where the tool's centre touches it, m.
+    /// From the object's centre to where the tool's centre touches it at most, m.
     pub touch_m: f64,
+    /// The same along the object's own x axis.
+    pub face_m: f64,
     /// Half the width of the object across the push, m.
     pub half_width_m: f64,
     /// Centre of the scene, m.
@@ -166,15 +168,20 @@ impl Path {
     }
 }
 
-/// A push along `angle_rad`: to the object, `distance_m` on, a short brake, back, a rest.
-fn push(
-    scene: &Scene,
-    place_m: [f64; 2],
+/// A push.
+#[derive(Clone, Copy, Debug)]
+struct Push {
     angle_rad: f64,
     aside_m: f64,
     speed_mps: f64,
     distance_m: f64,
-) -> Vec<[f64; 3]> {
+    /// Whether it begins slower than what sticks lets go at.
+    creeps: bool,
+}
+
+/// A push: to the object, on, a short brake, back, a rest.
+fn push(scene: &Scene, place_m: [f64; 2], push: Push) -> Vec<[f64; 3]> {
+    let Push { angle_rad, aside_m, speed_mps, distance_m, creeps } = push;
     let (sin, cos) = angle_rad.sin_cos();
     let at = |along: f64| {
         [place_m[0] + along * cos - aside_m * sin, place_m[1] + along * sin + aside_m * cos, scene.tool_height_m]
@@ -182,6 +189,10 @@ fn push(
     let begin = -(scene.touch_m + 0.03);
     let mut path = Path::from(scene.period_secs, at(begin));
     path.wait(0.2);
+    if creeps {
+        path.go(at(-scene.face_m - 0.0005), 0.1, 0.1);
+        path.go(at(-scene.face_m + 0.0015), 0.0003, 0.1);
+    }
     path.go(at(-scene.touch_m + distance_m), speed_mps, 0.04);
     path.wait(0.15);
     path.go(at(-scene.touch_m + distance_m - 0.03), 0.1, 0.1);
@@ -189,7 +200,7 @@ fn push(
     path.points
 }
 
-/// A designed set: eight directions at four speeds, known weights, reversals, drops, long rests and free motion.
+/// A designed set: eight directions at four speeds, known weights, reversals, creeps, drops, long rests and free motion.
 #[must_use]
 pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
     let mut draw = || -> f64 { rng.random_range(-1.0..1.0) };
@@ -200,7 +211,10 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
             let angle = f64::from(direction) * std::f64::consts::FRAC_PI_4;
             // Through the middle, left and right of it.
             let aside = [0.0, 0.35, -0.35][(direction as usize + s) % 3] * scene.half_width_m;
-            let commands = push(scene, place_m, angle, aside, speed, 0.08);
+            // What turns is not met where its face would be.
+            let creeps = s == 0 && direction % 2 == 0;
+            let way = Push { angle_rad: angle, aside_m: aside, speed_mps: speed, distance_m: 0.08, creeps };
+            let commands = push(scene, place_m, way);
             let yaw_rad = if direction % 2 == 0 { 0.0 } else { 0.6 * draw() } + angle;
             let added_mass_kg = if (direction as usize + s) % 4 == 1 { 0.3 } else { 0.0 };
             scripts.push(Script { place_m, lift_m: 0.0, yaw_rad, added_mass_kg, commands });
@@ -224,6 +238,21 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
         scripts.push(Script { place_m, lift_m: 0.0, yaw_rad: 0.0, added_mass_kg: 0.0, commands: path.points });
     }
     for index in 0..2 {
+        // A creep, slower than what sticks lets go at, and a walk: what differs between them is no Stribeck friction.
+        let place_m = [scene.centre_m[0] + 0.1 * draw(), scene.centre_m[1] + 0.1 * draw()];
+        let angle = f64::from(index) * std::f64::consts::FRAC_PI_2 + 0.3 * draw();
+        let (sin, cos) = angle.sin_cos();
+        let at = |along: f64| [place_m[0] + along * cos, place_m[1] + along * sin, scene.tool_height_m];
+        let mut path = Path::from(scene.period_secs, at(-(scene.touch_m + 0.03)));
+        path.wait(0.2);
+        path.go(at(-scene.face_m - 0.0005), 0.1, 0.1);
+        path.go(at(-scene.face_m + 0.0015), 0.0003, 0.1);
+        path.go(at(-scene.face_m + 0.0135), 0.006, 0.1);
+        path.go(at(-(scene.face_m + 0.02)), 0.1, 0.1);
+        path.wait(0.2);
+        scripts.push(Script { place_m, lift_m: 0.0, yaw_rad: angle, added_mass_kg: 0.0, commands: path.points });
+    }
+    for index in 0..2 {
         let place_m = [scene.centre_m[0] + 0.1 * draw(), scene.centre_m[1]];
         let start = [place_m[0] - scene.touch_m - 0.1, place_m[1], scene.tool_height_m];
         let mut path = Path::from(scene.period_secs, start);
@@ -234,7 +263,8 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
     for _ in 0..2 {
         // What grows with time: a push, a long rest, a push.
         let place_m = scene.centre_m;
-        let mut commands = push(scene, place_m, 0.0, 0.0, 0.08, 0.05);
+        let way = Push { angle_rad: 0.0, aside_m: 0.0, speed_mps: 0.08, distance_m: 0.05, creeps: false };
+        let mut commands = push(scene, place_m, way);
         let mut path = Path::from(scene.period_secs, commands[commands.len() - 1]);
         path.wait(25.0);
         let end = path.end();
@@ -257,7 +287,9 @@ pub fn passive(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
             let angle = std::f64::consts::PI * draw();
             let aside = 0.5 * draw() * scene.half_width_m;
             let speed = 0.12 + 0.08 * draw();
-            let commands = push(scene, place_m, angle, aside, speed, 0.08 + 0.04 * draw());
+            let distance_m = 0.08 + 0.04 * draw();
+            let way = Push { angle_rad: angle, aside_m: aside, speed_mps: speed, distance_m, creeps: false };
+            let commands = push(scene, place_m, way);
             Script { place_m, lift_m: 0.0, yaw_rad: angle + 0.5 * draw(), added_mass_kg: 0.0, commands }
         })
         .collect()

@@ -24,11 +24,12 @@ use rand::RngExt as _;
 
 use crate::generate::{Actions, FRICTION, MASS_KG};
 
-/// Whether a log of such actions can say anything of an effect. In a passive log force gain and mass are one number (no weight is known), and an
-/// episode of 3 s ends before a drift of the force has left the noise.
+/// Whether a log of such actions can say anything of an effect. In a passive log force gain and mass are one number (no weight is known), an
+/// episode of 3 s ends before a drift of the force has left the noise, and what sticks lets go within a millisecond of a push at 4 cm/s or more.
 #[must_use]
 pub fn identifiable(kind: EffectKind, actions: Actions) -> bool {
-    actions == Actions::Designed || !matches!(kind, EffectKind::ForceGain | EffectKind::ForceDrift)
+    actions == Actions::Designed
+        || !matches!(kind, EffectKind::ForceGain | EffectKind::ForceDrift | EffectKind::StaticFriction)
 }
 
 /// Which object shows an effect.

@@ -41,6 +41,7 @@ pub fn record(problem: &Problem, actions: Actions, seed: Seed) -> Result<Log, Re
         period_secs: config.control_period_secs,
         tool_height_m: scenario.task.tool_start_m[2],
         touch_m: reach_m + tool_m,
+        face_m: if object.shape == ObjectShape::Box { 0.5 * object.size_m[0] } else { reach_m } + tool_m,
         half_width_m: if object.shape == ObjectShape::Box { 0.5 * object.size_m[1] } else { 0.7 * reach_m },
         centre_m: [places.x_m.mean, places.y_m.mean],
     };
