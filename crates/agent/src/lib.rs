@@ -2,6 +2,23 @@
 //!
 //! [`Agent::run`] plays one episode on a [`World`] with one [`Method`] and returns its [`Episode`]; a [`Watcher`] may look on. The world is simulated
 //! ([`SimulatedWorld`]) or another program ([`ExternalWorld`]).
+//!
+//! # Example
+//!
+//! ```
+//! use agent::{Agent, Method, SimulatedWorld};
+//! use pomdp::{Purpose, Seed};
+//! use scenario::{Problem, Selection, find_root};
+//!
+//! let root = find_root(env!("CARGO_MANIFEST_DIR").as_ref())?;
+//! let problem = Problem::assemble(&Selection { domain: "D1".into(), ..Selection::new(&root) }.load()?, &root)?;
+//! let seed = Seed(1);
+//! let start = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
+//! let mut world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
+//! let episode = Agent::new(&problem, Method::Heuristic, None)?.run(&mut world, seed)?;
+//! assert!(!episode.steps.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod agent;
 mod belief_errors;

@@ -4,6 +4,19 @@
 //! `cargo xtask bench planner` plays the standard problems, `cargo xtask bench prior` trains and runs the network. Peers are
 //! Python packages: where one is missing, `missing: pip install …` is printed and its columns stay empty. Recorded answers of MuJoCo lie in
 //! `crates/physics-model/tests/data`, so that accuracy needs no Python.
+//!
+//! # Example
+//!
+//! ```no_run
+//! use scenario::{Selection, find_root};
+//!
+//! let root = find_root(env!("CARGO_MANIFEST_DIR").as_ref())?;
+//! let world = Selection::new(&root).load()?.world;
+//! for quantity in bench::closed_forms::measure(&root, &world)? {
+//!     assert!((quantity.ours / quantity.mujoco - 1.0).abs() < 0.2, "{}", quantity.text);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod accuracy;
 pub mod belief;

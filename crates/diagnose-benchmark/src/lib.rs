@@ -4,6 +4,21 @@
 //! truth lies elsewhere and is read by the scorer alone ([`score`]). What a benchmark holds is a function of its options ([`plan`]): effects of the
 //! catalogue at three strengths ([`draw`]), none, two, and some that no catalogue has ([`unknown`]), in worlds that another engine setting
 //! simulates than the model's ([`generate`]), from actions chosen to tell effects apart or as they come ([`actions`]).
+//!
+//! # Example
+//!
+//! ```
+//! use diagnose_benchmark::generate::Actions;
+//! use diagnose_benchmark::plan::{Options, Plan, VERSION};
+//! use physics_model::EffectKind;
+//!
+//! let (only, actions) = (vec![EffectKind::TableTilt], vec![Actions::Designed]);
+//! let options = Options { version: VERSION, seed: 1, sets: 3, none: 1, unknown: 0, pairs: 0, actions, only };
+//! let plan = Plan::new(options);
+//! // Which of the four is which, the order does not say.
+//! let hidden: Vec<String> = (0..plan.len()).flat_map(|set| plan.draw(set, 0).names()).collect();
+//! assert_eq!(hidden.iter().filter(|name| *name == "table_tilt").count(), 3);
+//! ```
 
 pub mod actions;
 pub mod draw;

@@ -15,6 +15,20 @@
 //! 6. [`report`]: where ([`locate`]), what, how sure ([`interval`]), before and after, what to record next ([`separate`]).
 //!
 //! The same log, seed and version give the same answer, whatever the number of threads.
+//!
+//! # Example
+//!
+//! ```no_run
+//! use discrepancy::{Nominal, Report, Settings, diagnose, rig_tool};
+//!
+//! let folder = "tests/data/mujoco-logs/logs/set-003";
+//! let log = measured_log::read(folder.as_ref())?;
+//! let nominal = Nominal::new(&log.header, rig_tool(&log, None)?)?;
+//! let settings = Settings::default();
+//! let report = Report::new(&diagnose(&log, folder, &nominal, &settings)?, &settings, 0.0);
+//! assert_eq!(report.effects[0].name, "table_tilt", "{}", report.summary);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod accept;
 mod begin;

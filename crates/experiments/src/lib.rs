@@ -6,6 +6,14 @@
 //!
 //! An [`Evaluation`] is one run, a [`Player`] plays what it lacks, a [`Suite`] is all runs of a [`Plan`] and puts them side by side
 //! ([`Combined`]). What depends on the clock stands at the end of a trial's line and in files of its own.
+//!
+//! # Example
+//!
+//! ```
+//! // 24 of 30: what the rate may be (Wilson, 95 %).
+//! let [low, high] = experiments::wilson95(24, 30);
+//! assert!((low - 0.627).abs() < 5e-4 && (high - 0.905).abs() < 5e-4);
+//! ```
 
 mod archive;
 mod clock;

@@ -26,6 +26,45 @@
 //! at 100. That is the solver's, with or without the correction.
 //!
 //! All quantities are SI; vectors are in the base frame of the robot, z up, unless their name says otherwise.
+//!
+//! # Example
+//!
+//! ```
+//! // A box that slides at 0.5 m/s stops after v² / (2 μ g), less half a step of the engine.
+//! use physics_model::config::{ObstacleMobility, WorldConfig};
+//! use physics_model::rig::{Rig, RigObject, RigShape, RigStart, RigTool};
+//! use physics_model::{BodyState, ObjectShape};
+//!
+//! let world = WorldConfig {
+//!     control_period_secs: 0.001,
+//!     control_steps: 1,
+//!     solver_iterations: 4,
+//!     contact_frequency_hz: 60.0,
+//!     contact_damping_ratio: 5.0,
+//!     table_height_m: 0.0,
+//!     gravity_mps2: 9.81,
+//!     tool_friction: 0.1,
+//!     obstacle_friction: 0.5,
+//!     arm_stiffness_npm: 50_000.0,
+//!     restitution: 0.0,
+//!     obstacle_mobility: ObstacleMobility::Movable,
+//! };
+//! let rig = Rig { world, tick_steps: 10, tool: RigTool::None };
+//! let (mass_kg, friction) = (0.5, 0.4);
+//! let shape = RigShape::Solid { shape: ObjectShape::Box, size_m: [0.08, 0.06, 0.05] };
+//! let start = BodyState {
+//!     position_m: [0.0, 0.0, 0.025],
+//!     orientation: [0.0, 0.0, 0.0, 1.0],
+//!     linear_mps: [0.5, 0.0, 0.0],
+//!     angular_rps: [0.0; 3],
+//! };
+//! let ticks = [[0.0; 3]; 30];
+//! let object = RigObject::new(shape, mass_kg, friction);
+//! let readings = rig.run(&object, &[], &RigStart::of_episode(start, None), &ticks)?;
+//! let slid_m = readings[29].object.position_m[0];
+//! assert!((slid_m / (0.5_f64.powi(2) / (2.0 * friction * 9.81)) - 1.0).abs() < 0.03, "{slid_m}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod action;
 mod arm;

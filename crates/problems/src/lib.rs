@@ -5,6 +5,18 @@
 //!
 //! For filters there are [`hmm`] (posterior and evidence by Bayes' rule), [`linear_gaussian`] (Kalman) and [`static_parameter`] (conjugate
 //! posteriors of two structures).
+//!
+//! # Example
+//!
+//! ```
+//! use pomdp::{GenerativeModel as _, Purpose, Seed};
+//! use problems::tiger::{Action, Tiger};
+//!
+//! let tiger = Tiger { ends_on_open: true };
+//! let mut tiger_is_left = true;
+//! let step = tiger.step(&mut tiger_is_left, &Action::OpenLeft, &mut Seed(1).stream(Purpose::Test, 0));
+//! assert_eq!(step.reward, -100.0);
+//! ```
 
 pub mod bits;
 pub mod episode;

@@ -2,6 +2,14 @@
 //!
 //! An [`Observer`] looks on at an episode, of which an [`EpisodeTrace`](recording::EpisodeTrace) is kept; [`episode_figure`] draws that from above.
 //! [`episode_page`], [`run_page`] and [`suite_page`] are self-contained HTML. Programs `demo` and `report`.
+//!
+//! # Example
+//!
+//! ```no_run
+//! let trace = recording::read("runs/demo/D4-sawyer-surmise-mixture/trace.json".as_ref())?;
+//! report::episode_figure(&trace).save("episode".as_ref())?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod above;
 pub mod describe;
