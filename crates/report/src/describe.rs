@@ -56,9 +56,10 @@ pub fn summary(trace: &EpisodeTrace, record: &TrialRecord) -> String {
     out.push_str("\n                       believed at the end      true\n");
     if let Some(truth) = truth {
         let probability = belief.shape_probability[truth.object.shape as usize];
-        let _ = writeln!(out, "shape                  {:<24} {}", percent(probability), truth.object.shape.name());
-        let there = truth.obstacle.map_or("none", |body| body.shape.name());
-        let _ = writeln!(out, "obstacle               {:<24} {there}", percent(belief.obstacle_probability));
+        let shape = truth.object.shape.name();
+        let _ = writeln!(out, "it is a {shape:<14} {:<24} yes", percent(probability));
+        let there = truth.obstacle.map_or("no".into(), |body| format!("yes, a {}", body.shape.name()));
+        let _ = writeln!(out, "there is an obstacle   {:<24} {there}", percent(belief.obstacle_probability));
     }
     for p in &belief.parameters {
         let name = if p.unit.is_empty() { p.name.clone() } else { format!("{} / {}", p.name, p.unit) };

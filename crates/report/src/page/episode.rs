@@ -8,9 +8,15 @@ use crate::describe;
 /// A page about an episode; `svg` is its picture from above.
 #[must_use]
 pub fn episode_page(trace: &EpisodeTrace, svg: &str) -> String {
+    let believes = trace.moments.iter().any(|moment| moment.belief.is_some());
+    let reading = format!(
+        "<p class=\"soft\">{}{SOLID}{}</p>\n",
+        if believes { GHOSTS } else { "" },
+        if believes { BELOW } else { "" }
+    );
     let body = [
         outcome(trace),
-        section("above", "From above", &(picture(svg, "the episode from above") + READING)),
+        section("above", "From above", &(picture(svg, "the episode from above") + &reading)),
         section("belief", "What it believed at the end", &belief(trace)),
         section("steps", "Step by step", &steps(trace)),
         section("source", "Where this comes from", &source(trace)),
@@ -18,9 +24,10 @@ pub fn episode_page(trace: &EpisodeTrace, svg: &str) -> String {
     page(&trace.title, &body.concat())
 }
 
-const READING: &str = "<p class=\"soft\">Each map shows a hundred particles of the belief over each other: the stronger the colour, the more probable. \
-    Solid lines are the true object and the tool with their ways so far, dashes a true obstacle, which no sensor sees. \
-    Below, over the actions: what the object is and whether there is an obstacle, then friction and mass with the 90 % of the belief.</p>\n";
+const GHOSTS: &str = "Each map shows a hundred particles of the belief over each other: the stronger the colour, the more probable; none after the action that ends \
+    the episode, from which nothing is learnt. ";
+const SOLID: &str = "Solid lines are the true object and the tool with their ways so far, dashes a true obstacle, which no sensor sees.";
+const BELOW: &str = " Below, over the actions: what the object is and whether there is an obstacle, then friction and mass with the 90 % of the belief.";
 
 fn outcome(trace: &EpisodeTrace) -> String {
     let last = trace.moments.len().saturating_sub(1);
