@@ -56,6 +56,15 @@ fn bad_scenarios_are_refused_and_nothing_is_written() {
         refused("eval", &eval(&format!("--domain {}", file.display())), parts);
     }
     refused("eval", &eval("--domain nowhere.toml"), &["nowhere.toml", "cannot be read"]);
+    let large =
+        "--domain D1 --set belief.rejection.particles=4000000000 --set belief.rejection.max_attempts=4000000000";
+    refused("eval", &eval(large), &["`particles` is 4000000000", "at most 1000000"]);
+    // Names with line breaks and colours: one line, without them.
+    let output =
+        end_to_end::program("eval").args(["--domain", "a\nb\x1b[31m", "--methods", "no-rnn"]).output().unwrap();
+    let message = stderr(&output);
+    assert!(output.status.code() == Some(2) && message.contains("`a b [31m`"), "{message:?}");
+    assert!(message.trim().lines().count() == 1 && !message.contains('\x1b'), "{message:?}");
     assert!(!out.exists(), "a refused run leaves nothing behind");
 }
 
@@ -114,7 +123,23 @@ fn a_run_folder_of_another_run_is_refused_and_left_alone() {
     assert!(run("eval", &eval(1)).status.success());
     let before = files(folder.path());
     refused("eval", &eval(2), &["run.json", "`seed` is 1", "has 2"]);
+    let out = folder.path().display();
+    let others = [
+        ("demo", "--quick --method heuristic".to_owned()),
+        ("record-log", "--actions passive".into()),
+        ("datagen", "--transitions 500".into()),
+        ("train", format!("--epochs 1 --data {}", trained().data.display())),
+        ("diagnose", "--measured tests/data/mujoco-logs/logs/set-003".into()),
+    ];
+    for (binary, arguments) in others {
+        refused(binary, &format!("{arguments} --out {out}"), &["holds an evaluation (run.json)", "choose another"]);
+    }
+    refused("report", &format!("{out} --out {out}/trials.jsonl"), &["trials.jsonl", "no page of ours"]);
     assert!(files(folder.path()) == before);
+    // A page is replaced by a newer one.
+    for _ in 0..2 {
+        assert!(run("report", &out.to_string()).status.success());
+    }
 }
 
 #[test]

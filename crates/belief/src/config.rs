@@ -5,6 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::Error;
 
+/// Beyond these a typing error would take all memory, or all night.
+pub(crate) const MOST_PARTICLES: usize = 1_000_000;
+pub(crate) const MOST_ATTEMPTS: usize = 100_000_000;
+
 /// Settings of [`crate::RejectionFilter`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -30,8 +34,10 @@ impl Config {
     pub fn validate(&self) -> Result<(), Error> {
         let Self { particles, max_attempts, noise_share, proposal_share } = self;
         require(*particles >= 1, "particles", particles, "at least 1")?;
+        require(*particles <= MOST_PARTICLES, "particles", particles, format!("at most {MOST_PARTICLES}"))?;
         let limit = format!("at least particles = {particles}");
         require(max_attempts >= particles, "max_attempts", max_attempts, limit)?;
+        require(*max_attempts <= MOST_ATTEMPTS, "max_attempts", max_attempts, format!("at most {MOST_ATTEMPTS}"))?;
         for (key, share) in [("noise_share", noise_share), ("proposal_share", proposal_share)] {
             require((0.0..1.0).contains(share), key, share, "in [0, 1)")?;
         }
@@ -99,6 +105,8 @@ mod tests {
         };
         assert_eq!(config().validate(), Ok(()));
         assert_eq!(message(|c| c.particles = 0), "belief: `particles` is 0, but must be at least 1");
+        let many = message(|c| (c.particles, c.max_attempts) = (4_000_000_000, 4_000_000_000));
+        assert_eq!(many, "belief: `particles` is 4000000000, but must be at most 1000000");
         assert_eq!(
             message(|c| c.max_attempts = 999),
             "belief: `max_attempts` is 999, but must be at least particles = 1000"

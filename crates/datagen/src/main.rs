@@ -82,7 +82,7 @@ fn main() -> ExitCode {
             ExitCode::from(130)
         }
         Err(error) => {
-            whole_file::say!("error: {error:#}");
+            whole_file::complain(&error);
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -99,6 +99,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
         // Before anything is written: a machine without the engine must not leave a plan behind.
         engine.check()?;
     }
+    whole_file::check_owner(&job.out, "plan.json")?;
     job.plan.open(&job.out)?;
     let _lock = Lock::take(&job.out.join("plan.json"))?;
     let missing = job.missing_shards()?;
@@ -108,7 +109,13 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
+    // Who asks twice does not want to wait for what is at work: finished work is safe.
+    let stop = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(stop).context("cannot listen for interrupts")?;
     let bar = progress(missing.len() as u64 * job.plan.episodes_per_shard, "episodes");
     #[expect(clippy::disallowed_methods, reason = "a program may measure its rate")]
     let started = std::time::Instant::now();

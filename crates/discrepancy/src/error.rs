@@ -32,6 +32,12 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+    /// The folder for the results holds others.
+    #[error("{source}: {}", source.source)]
+    Taken {
+        /// What is there.
+        source: whole_file::Error,
+    },
     /// A file could not be written whole.
     #[error("{source}: {}", source.source)]
     Write {

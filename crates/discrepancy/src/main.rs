@@ -40,7 +40,7 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            whole_file::say!("error: {error}");
+            whole_file::complain(&error);
             // 2 is bad input; a disk that refuses is a failure.
             if let Error::Write { .. } | Error::Folder { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
         }
@@ -59,14 +59,20 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     if let Some(path) = &arguments.model {
         ModelFile::read(path)?.apply(&mut nominal)?;
     }
+    // Before a minute is spent on what could not be written.
+    let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.measured));
+    whole_file::check_owner(&out, "report.json").map_err(|source| Error::Taken { source })?;
+    let made = !out.exists();
+    std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
     let settings = Settings { seed: arguments.seed, ..Settings::default() };
     let name = arguments.measured.display().to_string();
-    let diagnosis = diagnose(&log, &name, &nominal, &settings)?;
+    let diagnosis = diagnose(&log, &name, &nominal, &settings).inspect_err(|_| {
+        // A log that says too little leaves nothing behind.
+        let _ = made.then(|| std::fs::remove_dir(&out));
+    })?;
     let report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
     let json =
         serde_json::to_string_pretty(&report).map_err(|error| Error::Model { reason: error.to_string() })? + "\n";
-    let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.measured));
-    std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
     let model = ModelFile::new(&nominal, &diagnosis, &report).to_toml()?;
     for (file, text) in [("model.toml", &model), ("report.html", &page(&name, &report)), ("report.json", &json)] {
         whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;

@@ -35,7 +35,7 @@ struct Arguments {
     /// With --all: copies the combined tables and pictures to assets/results.
     #[arg(long, requires = "all", conflicts_with = "quick")]
     publish: bool,
-    /// Arm: sawyer or jaco.
+    /// Arm: sawyer, jaco, or a robot file (docs/your-arm.md).
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Preset of belief and planner.
@@ -121,7 +121,7 @@ fn main() -> ExitCode {
             ExitCode::from(130)
         }
         Err(error) => {
-            whole_file::say!("error: {error:#}");
+            whole_file::complain(&error);
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -157,6 +157,7 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
         // Before anything is written: a machine without the engine must not leave a folder behind.
         engine.check()?;
     }
+    whole_file::check_owner(&out, "run.json")?;
     let run = evaluation.open(&out)?;
     if run.resumed() > 0 {
         whole_file::say!("{} trials are finished already", run.resumed());
@@ -286,7 +287,13 @@ fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &Atomic
 fn listen_for_interrupts() -> Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
+    // Who asks twice does not want to wait for what is at work: finished work is safe.
+    let stop = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(stop).context("cannot listen for interrupts")?;
     Ok(interrupted)
 }
 

@@ -59,7 +59,7 @@ fn main() -> ExitCode {
     match imported.and_then(|(log, notes)| write(&target, &log, &notes)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            whole_file::say!("error: {error}");
+            whole_file::complain(&error);
             // 2 is bad input; a disk that refuses is a failure.
             if let Error::Write { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
         }

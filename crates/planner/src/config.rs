@@ -135,9 +135,13 @@ impl Config {
             // Below this not even one simulation a tree fits, and there would be nothing to choose from.
             Budget::Transitions(n) => {
                 let limit = format!("at least depth × trees = {}", depth.saturating_mul(trees));
-                require(n / trees >= depth, "budget.transitions", &n, limit)
+                require(n / trees >= depth, "budget.transitions", &n, limit)?;
+                require(n <= 1 << 30, "budget.transitions", &n, "at most 2³⁰")
             }
-            Budget::Milliseconds(n) => require(n >= 1, "budget.milliseconds", &n, "at least 1"),
+            Budget::Milliseconds(n) => {
+                require(n >= 1, "budget.milliseconds", &n, "at least 1")?;
+                require(n <= 1 << 30, "budget.milliseconds", &n, "at most 2³⁰")
+            }
         }?;
         let nodes = self.nodes;
         let limit = format!("at least trees = {trees}, at most 2³²");

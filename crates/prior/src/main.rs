@@ -92,7 +92,7 @@ fn main() -> ExitCode {
             ExitCode::from(130)
         }
         Err(error) => {
-            whole_file::say!("error: {error:#}");
+            whole_file::complain(&error);
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -141,6 +141,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
         gradient: if arguments.autodiff { GradientPath::Autodiff } else { GradientPath::Fused },
     };
     let seed = Seed(arguments.seed);
+    whole_file::check_owner(&out, "prior.json")?;
     let state = out.join("training");
     let mut trainer = open_trainer(&out, &state, arguments.resume, &layout, &config, &sequences, seed)?;
     let provenance: BTreeMap<String, String> = [
@@ -213,7 +214,13 @@ fn open_trainer(
 fn train(trainer: &mut Trainer, config: &TrainConfig, state: &Path) -> Result<bool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("cannot listen for interrupts")?;
+    // Who asks twice does not want to wait for what is at work: finished work is safe.
+    let stop = move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(stop).context("cannot listen for interrupts")?;
     let bar = ProgressBar::new(config.max_epochs as u64);
     let style = "{bar:40} {pos}/{len} epochs, {eta} left, {msg}";
     bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));

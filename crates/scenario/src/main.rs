@@ -82,7 +82,7 @@ fn main() -> ExitCode {
             }
         },
         Err(error) => {
-            whole_file::say!("error: {error:#}");
+            whole_file::complain(&error);
             ExitCode::from(2)
         }
     }

@@ -12,6 +12,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod owner;
 mod terminal;
 
 use std::cell::Cell;
@@ -20,7 +21,8 @@ use std::panic::{UnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-pub use terminal::{print, say, show};
+pub use owner::check_owner;
+pub use terminal::{complain, print, say, show};
 
 /// What to do with a file that is already there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

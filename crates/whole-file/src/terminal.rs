@@ -1,6 +1,9 @@
 //! What programs say: a closed pipe is a reader who has seen enough.
 
+use std::fmt::Display;
 use std::io::{self, Write as _};
+
+use crate::one_line;
 
 /// Prints to standard output. A reader that has seen enough, and closed the pipe, is no error.
 ///
@@ -26,6 +29,11 @@ pub fn show(text: &str) {
 /// Says something on standard error, where anybody listens.
 pub fn say(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// Says why a program ends: one line, whatever names and files are quoted in it.
+pub fn complain(error: &dyn Display) {
+    say(&format!("error: {}", one_line(&format!("{error:#}"), 4000)));
 }
 
 /// [`show`] of a line, as `println!` formats it.

@@ -94,7 +94,7 @@ fn main() -> ExitCode {
         Verb::Ci => ci::run(),
     };
     result.unwrap_or_else(|error| {
-        whole_file::say!("error: {error:#}");
+        whole_file::complain(&error);
         ExitCode::FAILURE
     })
 }

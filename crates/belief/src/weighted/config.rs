@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
-use crate::config::require;
+use crate::config::{MOST_ATTEMPTS, MOST_PARTICLES, require};
 
 /// Settings of [`crate::WeightedFilter`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -54,10 +54,14 @@ impl WeightedConfig {
         require(c.particles_min >= 1, "particles_min", &c.particles_min, "at least 1")?;
         let limit = format!("at least particles_min = {}", c.particles_min);
         require(c.particles_max >= c.particles_min, "particles_max", &c.particles_max, limit)?;
+        let limit = format!("at most {MOST_PARTICLES}");
+        require(c.particles_max <= MOST_PARTICLES, "particles_max", &c.particles_max, limit)?;
         require(c.kld_error > 0.0, "kld_error", &c.kld_error, "above 0")?;
         require(c.kld_quantile >= 0.0 && c.kld_quantile <= 10.0, "kld_quantile", &c.kld_quantile, "in [0, 10]")?;
         let limit = format!("at least particles_max = {}", c.particles_max);
         require(c.max_transitions >= c.particles_max, "max_transitions", &c.max_transitions, limit)?;
+        let limit = format!("at most {MOST_ATTEMPTS}");
+        require(c.max_transitions <= MOST_ATTEMPTS, "max_transitions", &c.max_transitions, limit)?;
         require((0.0..=1.0).contains(&c.resample_share), "resample_share", &c.resample_share, "in [0, 1]")?;
         let limit = format!("in [0, resample_share = {}]", c.resample_share);
         let within = (0.0..=c.resample_share).contains(&c.tempering_share);

@@ -40,13 +40,17 @@ struct Arguments {
     root: Option<PathBuf>,
 }
 
+/// The log is recorded and cannot be kept.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+struct Failed(String);
+
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            whole_file::say!("error: {error:#}");
-            let wrote = matches!(error.downcast_ref(), Some(measured_log::Error::Write { .. }));
-            ExitCode::from(if wrote || error.is::<whole_file::Error>() { 1 } else { 2 })
+            whole_file::complain(&error);
+            ExitCode::from(if error.is::<Failed>() { 1 } else { 2 })
         }
     }
 }
@@ -64,9 +68,16 @@ fn run(arguments: &Arguments) -> Result<()> {
     };
     let problem = Problem::assemble(&selection.load()?, &root)?;
     let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
-    measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new())?;
+    whole_file::check_owner(&arguments.out, "log.toml")?;
+    match measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new()) {
+        Err(taken @ measured_log::Error::Exists { .. }) => return Err(taken.into()),
+        Err(error) => return Err(Failed(error.to_string()).into()),
+        Ok(()) => {}
+    }
     let model = ModelFile::of_effects(problem.scenario.effects.model.clone()).to_toml()?;
-    whole_file::write(&arguments.out.join("model.toml"), model.as_bytes(), Existing::Replace)?;
+    let model_file = arguments.out.join("model.toml");
+    whole_file::write(&model_file, model.as_bytes(), Existing::Replace)
+        .map_err(|error| Failed(format!("{error}: {}", error.source)))?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
     whole_file::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
     Ok(())

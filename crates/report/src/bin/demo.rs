@@ -20,7 +20,7 @@ struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
     #[arg(long, default_value = "D4")]
     domain: String,
-    /// Arm: sawyer or jaco.
+    /// Arm: sawyer, jaco, or a robot file (docs/your-arm.md).
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Preset of belief and planner.
@@ -65,7 +65,7 @@ fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            whole_file::say!("error: {error:#}");
+            whole_file::complain(&error);
             ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
         }
     }
@@ -98,9 +98,13 @@ fn run(arguments: &Arguments) -> Result<()> {
     agent::Agent::new(&problem, method, prior.as_ref())?;
     let out = arguments.out.clone().unwrap_or_else(|| {
         let runs = root.join(if arguments.quick { "runs/quick/demo" } else { "runs/demo" });
-        runs.join(format!("{}-{}-{}-{}", scenario.name, scenario.robot.name, scenario.preset, method.name()))
+        let name = format!("{}-{}-{}-{}", scenario.name, scenario.robot.name, scenario.preset, method.name());
+        // Another world than the usual one lies apart.
+        let usual = (arguments.seed, arguments.trial) == (1, 0);
+        runs.join(if usual { name } else { format!("{name}-seed-{}-trial-{}", arguments.seed, arguments.trial) })
     });
-    std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
+    whole_file::check_owner(&out, "trace.json")?;
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display())).context(Failed)?;
     let game = Game { arguments, scenario: &scenario, problem: &problem, method, prior: prior.as_ref() };
     let (record, trace) = game.play(scenario::commit(&root)).context(Failed)?;
     write(&trace, &out).context(Failed)?;

@@ -1,9 +1,11 @@
 //! `cargo xtask report`: a run or an episode as a page.
 
-use std::path::PathBuf;
+use std::fs::File;
+use std::io::{ErrorKind, Read as _};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Result, anyhow};
 use clap::Parser;
 use experiments::Archive;
 use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
@@ -19,18 +21,27 @@ struct Arguments {
     out: Option<PathBuf>,
 }
 
+/// The page is made and cannot be kept.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}: {cause}", cause = .0.source)]
+struct Unwritten(whole_file::Error);
+
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            whole_file::say!("error: {error:#}");
-            ExitCode::from(2)
+            whole_file::complain(&error);
+            ExitCode::from(if error.is::<Unwritten>() { 1 } else { 2 })
         }
     }
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
     let folder = &arguments.run;
+    let out = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
+    if !is_page(&out) {
+        return Err(anyhow!("{}: is there and is no page of ours: choose another --out", out.display()));
+    }
     let page = if folder.join("trace.json").is_file() {
         let trace = recording::read(&folder.join("trace.json"))?;
         episode_page(&trace, &episode_figure(&trace).svg()?)
@@ -43,9 +54,19 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         suite_page(&suite)
     };
-    let out = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
-    whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace)
-        .with_context(|| format!("cannot write {}", out.display()))?;
+    whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace).map_err(Unwritten)?;
     whole_file::say!("written to {}", out.display());
     Ok(())
 }
+
+/// Whether a file may be replaced: nothing is there, or an older page.
+fn is_page(file: &Path) -> bool {
+    let mut start = [0; PAGE.len()];
+    match File::open(file) {
+        Ok(mut found) => file.is_file() && found.read_exact(&mut start).is_ok() && start == *PAGE,
+        Err(error) => error.kind() == ErrorKind::NotFound || !file.is_file(),
+    }
+}
+
+/// What all pages begin with.
+const PAGE: &[u8; 15] = b"<!DOCTYPE html>";
