@@ -20,7 +20,7 @@ pub(crate) struct Quota {
 ///
 /// Each likely structure κ gets n_κ particles of weight P_κ / n_κ, where P_κ is its probability: however the n_κ are chosen, the expected
 /// weight of every particle stays what it was. The unlikely ones are drawn as one group. Equal weights within a group replace the
-/// old ones.
+/// old ones. A group so light that its equal weights underflow to 0 is not drawn: no particle has the weight 0.
 pub(crate) fn resample(
     weights: &[f64],
     kinds: &[usize],
@@ -58,9 +58,10 @@ pub(crate) fn resample_with_shares(
     let counts = allocate(&group_mass, structures, count, quota.particles);
     let mut drawn = Vec::with_capacity(count);
     for ((members, &count), &mass) in members.iter().zip(&counts).zip(&group_mass) {
-        if count > 0 {
+        let weight = mass / count.max(1) as f64;
+        if count > 0 && weight > 0.0 {
             let chosen = stratified(members.iter().map(|&i| weights[i]), mass, count, rng);
-            drawn.extend(chosen.into_iter().map(|at| (members[at], mass / count as f64)));
+            drawn.extend(chosen.into_iter().map(|at| (members[at], weight)));
         }
     }
     let new_weight = |&group: &usize| group_mass[group] / counts[group].max(1) as f64;
@@ -187,6 +188,17 @@ mod tests {
             .collect();
         let variance = counts.iter().map(|c| (c - 16.0).powi(2)).sum::<f64>() / 2000.0;
         assert!((variance - 8.0).abs() < 1.0, "{variance}");
+    }
+
+    #[test]
+    fn a_group_too_light_to_be_shared_is_not_drawn() {
+        // Structure 1 asks for four particles; a quarter of the smallest positive number is 0.
+        let weights = [0.5, 0.5, f64::from_bits(1)];
+        for (quota, threshold) in [(4, 0.0), (4, 0.5), (1, 0.0)] {
+            let drawn = resample(&weights, &[0, 0, 1], 2, 16, Quota { particles: quota, threshold }, &mut rng(3));
+            assert!(drawn.iter().all(|&(_, w)| w > 0.0), "{quota} {threshold}: {drawn:?}");
+            assert!((drawn.iter().map(|(_, w)| w).sum::<f64>() - 1.0).abs() < 1e-12);
+        }
     }
 
     proptest! {
