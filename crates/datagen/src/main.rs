@@ -109,13 +109,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    // Who asks twice does not want to wait for what is at work: finished work is safe.
-    let stop = move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    };
-    ctrlc::set_handler(stop).context("cannot listen for interrupts")?;
+    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
     let bar = progress(missing.len() as u64 * job.plan.episodes_per_shard, "episodes");
     #[expect(clippy::disallowed_methods, reason = "a program may measure its rate")]
     let started = std::time::Instant::now();

@@ -112,13 +112,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let plan = Plan::new(options);
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    // Who asks twice does not want to wait for what is at work: finished work is safe.
-    let stop = move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    };
-    ctrlc::set_handler(stop).context("cannot listen for interrupts")?;
+    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
     let threads = arguments.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads")?;
     let arms = arguments.root.as_deref();

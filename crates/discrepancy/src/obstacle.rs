@@ -94,28 +94,37 @@ fn most_voted(witnesses: &[Witness], outlines: Outlines, count: usize) -> Vec<Pl
     let around = outlines.object_m.max(outlines.tool_m) + RADII_M[RADII_M.len() - 1] + TOLERANCE_M;
     let pushed = events().map(|event| event.row.tool.filter(|_| event.tool).unwrap_or(event.row.object));
     let Some((low, high)) = corners(pushed, around) else { return Vec::new() };
-    let cells = |axis: usize| ((high[axis] - low[axis]) / GRID_M).ceil() as usize + 1;
-    let mut voted: Vec<(f64, Place)> = Vec::new();
+    let votes = |place, radius_m| witnesses.iter().map(|witness| witness.vote(place, radius_m, outlines)).sum::<f64>();
+    let near = |a: &Place, b: &Place| (a.1 - b.1).abs() < WIDER_M && distance(a.0, b.0) < APART_M;
+    best_places((low, high), GRID_M, &RADII_M, votes, near, count)
+}
+
+/// Of circles on a grid between two corners those with the highest scores above 0, at most `count`, none near a better one.
+pub(crate) fn best_places(
+    (low, high): ([f64; 2], [f64; 2]),
+    grid_m: f64,
+    radii_m: &[f64],
+    score: impl Fn([f64; 2], f64) -> f64,
+    near: impl Fn(&Place, &Place) -> bool,
+    count: usize,
+) -> Vec<Place> {
+    let cells = |axis: usize| ((high[axis] - low[axis]) / grid_m).ceil() as usize + 1;
+    let mut found: Vec<(f64, Place)> = Vec::new();
     for i in 0..cells(0) {
         for j in 0..cells(1) {
-            let place = [low[0] + i as f64 * GRID_M, low[1] + j as f64 * GRID_M];
-            for radius_m in RADII_M {
-                let votes = witnesses.iter().map(|witness| witness.vote(place, radius_m, outlines)).sum::<f64>();
-                if votes > 0.0 {
-                    voted.push((votes, (place, radius_m)));
-                }
-            }
+            let place = [low[0] + i as f64 * grid_m, low[1] + j as f64 * grid_m];
+            found.extend(radii_m.iter().map(|radius_m| (score(place, *radius_m), (place, *radius_m))));
         }
     }
-    voted.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.retain(|(score, _)| *score > 0.0);
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<Place> = Vec::new();
-    for (_, (place, radius_m)) in voted {
+    for (_, place) in found {
         if chosen.len() == count {
             break;
         }
-        let near = |other: &Place| (other.1 - radius_m).abs() < WIDER_M && distance(other.0, place) < APART_M;
-        if !chosen.iter().any(near) {
-            chosen.push((place, radius_m));
+        if !chosen.iter().any(|other| near(other, &place)) {
+            chosen.push(place);
         }
     }
     chosen

@@ -5,7 +5,7 @@
 
 use physics_model::rig::RigReading;
 
-use crate::obstacle::{Place, average, corners, distance};
+use crate::obstacle::{Place, average, best_places, corners, distance};
 use crate::trial::{Happened, Trial};
 
 /// Distance of grid points, m.
@@ -52,26 +52,9 @@ fn pushed(rows: &[Happened]) -> Vec<Reading> {
 }
 
 fn ranked(readings: &[Reading], count: usize) -> Vec<Place> {
-    let Some((low, high)) = corners(readings.iter().map(|reading| reading.place_m), 0.0) else { return Vec::new() };
-    let cells = |axis: usize| ((high[axis] - low[axis]) / GRID_M).ceil() as usize + 1;
-    let mut found: Vec<(f64, Place)> = Vec::new();
-    for i in 0..cells(0) {
-        for j in 0..cells(1) {
-            let place = [low[0] + i as f64 * GRID_M, low[1] + j as f64 * GRID_M];
-            found.extend(RADII_M.iter().map(|radius_m| (explained(readings, place, *radius_m), (place, *radius_m))));
-        }
-    }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut chosen: Vec<Place> = Vec::new();
-    for (explained, (place, radius_m)) in found {
-        if chosen.len() == count || explained <= 0.0 {
-            break;
-        }
-        if chosen.iter().all(|other| distance(other.0, place) > APART_M) {
-            chosen.push((place, radius_m));
-        }
-    }
-    chosen
+    let Some(corners) = corners(readings.iter().map(|reading| reading.place_m), 0.0) else { return Vec::new() };
+    let score = |place, radius_m| explained(readings, place, radius_m);
+    best_places(corners, GRID_M, &RADII_M, score, |a, b| distance(a.0, b.0) <= APART_M, count)
 }
 
 /// By how much two levels of friction, inside a circle and outside, have less squares than one.

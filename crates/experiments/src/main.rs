@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use agent::{Method, Timeouts, WorldAddress};
@@ -287,13 +287,7 @@ fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &Atomic
 fn listen_for_interrupts() -> Result<Arc<AtomicBool>> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    // Who asks twice does not want to wait for what is at work: finished work is safe.
-    let stop = move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    };
-    ctrlc::set_handler(stop).context("cannot listen for interrupts")?;
+    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
     Ok(interrupted)
 }
 

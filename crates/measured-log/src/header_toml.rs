@@ -11,6 +11,9 @@ use crate::error::Problem;
 use crate::header::{Header, Noise, Object, Robot, Shape, SplitConfig, Table};
 use crate::{Error, Number, VERSION};
 
+/// Characters of a parser's message that are quoted.
+const MESSAGE: usize = 300;
+
 /// Comments for `log.toml` by dotted key, such as `object.mass_kg`: where a number is from. The key "" stands for the head of the file,
 /// `object.[]` for the table `[object]`.
 pub type Notes = BTreeMap<&'static str, String>;
@@ -107,7 +110,10 @@ impl RawObject {
 pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
     let value: toml::Table = toml::from_str(text).map_err(|e| {
         let line = whole_file::line_of(text, e.span().map_or(0, |span| span.start));
-        Error::Syntax { path: path.to_owned(), reason: format!("line {line}: {}", one_line(e.message())) }
+        Error::Syntax {
+            path: path.to_owned(),
+            reason: format!("line {line}: {}", whole_file::one_line(e.message(), MESSAGE)),
+        }
     })?;
     // The version alone comes first, so that an old file says so instead of listing unknown keys.
     if let Some(found) = value.get("version")
@@ -117,7 +123,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
     }
     let mut raw: Raw = serde_path_to_error::deserialize(Value::Table(value)).map_err(|error| {
         let mut key = whole_file::one_line(&error.path().to_string(), 200);
-        let reason = one_line(error.into_inner().message());
+        let reason = whole_file::one_line(error.into_inner().message(), MESSAGE);
         // serde reports an unknown or a missing key on its table: the key itself stands in the message.
         let named = ["unknown field `", "missing field `"].iter().find_map(|start| reason.strip_prefix(start));
         if let Some(name) = named.and_then(|m| m.split('`').next())
@@ -150,11 +156,6 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
         Ok(header)
     };
     checked().map_err(|problem| problem.at(path, path))
-}
-
-/// A parser's message on one line of bounded length.
-fn one_line(message: &str) -> String {
-    whole_file::one_line(message, 300)
 }
 
 /// TOML text that [`parse`] reads back to the same header, with `notes` as comments.

@@ -214,13 +214,7 @@ fn open_trainer(
 fn train(trainer: &mut Trainer, config: &TrainConfig, state: &Path) -> Result<bool> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupted);
-    // Who asks twice does not want to wait for what is at work: finished work is safe.
-    let stop = move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    };
-    ctrlc::set_handler(stop).context("cannot listen for interrupts")?;
+    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
     let bar = ProgressBar::new(config.max_epochs as u64);
     let style = "{bar:40} {pos}/{len} epochs, {eta} left, {msg}";
     bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));

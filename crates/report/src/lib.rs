@@ -20,4 +20,4 @@ mod page;
 pub use above::episode_figure;
 pub use error::Error;
 pub use observer::{Observer, tool_parts};
-pub use page::{Suite, episode_page, run_page, suite_page};
+pub use page::{Suite, episode_page, may_be_replaced, run_page, suite_page};

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 pub use owner::check_owner;
-pub use terminal::{complain, print, say, show};
+pub use terminal::{complain, interrupted, print, say, show};
 
 /// What to do with a file that is already there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

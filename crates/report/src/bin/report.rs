@@ -1,14 +1,12 @@
 //! `cargo xtask report`: a run or an episode as a page.
 
-use std::fs::File;
-use std::io::{ErrorKind, Read as _};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Result, anyhow};
 use clap::Parser;
 use experiments::Archive;
-use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
+use report::{Error, Suite, episode_figure, episode_page, may_be_replaced, run_page, suite_page};
 
 /// Makes a self-contained HTML page of a run of `eval`, of all tables of `eval --all`, or of an episode of `demo`.
 #[derive(Debug, Parser)]
@@ -39,7 +37,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<()> {
     let folder = &arguments.run;
     let out = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
-    if !is_page(&out) {
+    if !may_be_replaced(&out) {
         return Err(anyhow!("{}: is there and is no page of ours: choose another --out", out.display()));
     }
     let page = if folder.join("trace.json").is_file() {
@@ -58,15 +56,3 @@ fn run(arguments: &Arguments) -> Result<()> {
     whole_file::say!("written to {}", out.display());
     Ok(())
 }
-
-/// Whether a file may be replaced: nothing is there, or an older page.
-fn is_page(file: &Path) -> bool {
-    let mut start = [0; PAGE.len()];
-    match File::open(file) {
-        Ok(mut found) => file.is_file() && found.read_exact(&mut start).is_ok() && start == *PAGE,
-        Err(error) => error.kind() == ErrorKind::NotFound || !file.is_file(),
-    }
-}
-
-/// What all pages begin with.
-const PAGE: &[u8; 15] = b"<!DOCTYPE html>";

@@ -6,15 +6,34 @@ mod suite;
 #[cfg(test)]
 mod tests;
 
+use std::fs::File;
+use std::io::{ErrorKind, Read as _};
+use std::path::Path;
+
 pub use episode::episode_page;
 pub use run::run_page;
 pub use suite::{Suite, suite_page};
+
+/// What every page begins with.
+const BEGINNING: &str = "<!DOCTYPE html>\n";
+
+/// Whether a page may be written there: nothing is, or an older page, or what no page can replace.
+#[must_use]
+pub fn may_be_replaced(file: &Path) -> bool {
+    let mut start = [0; BEGINNING.len()];
+    match File::open(file) {
+        Ok(mut found) => {
+            file.is_file() && found.read_exact(&mut start).is_ok() && start.as_slice() == BEGINNING.as_bytes()
+        }
+        Err(error) => error.kind() == ErrorKind::NotFound || !file.is_file(),
+    }
+}
 
 /// A page with this title.
 fn page(title: &str, body: &str) -> String {
     let title = escape(title);
     format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\
+        "{BEGINNING}<html lang=\"en\"><head><meta charset=\"utf-8\"/>\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/><title>{title}</title>\n\
          <style>\n{}</style></head>\n<body><main>\n<h1>{title}</h1>\n{body}</main></body></html>\n",
         include_str!("style.css")
