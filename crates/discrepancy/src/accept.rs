@@ -7,7 +7,7 @@ use nalgebra::DVector;
 use crate::diagnosis::{Rival, Round};
 use crate::fit::Fit;
 use crate::interval::bootstrap;
-use crate::likelihood::episode_cost;
+use crate::likelihood::{NOISE_FLOOR, episode_cost};
 
 /// Share of resamples in which a strength has to have the same sign.
 const SAME_SIGN: f64 = 0.95;
@@ -27,8 +27,8 @@ const KEPT: f64 = 0.1;
 pub(crate) struct Asked {
     /// Least gain in ln evidence.
     pub(crate) least: f64,
-    /// Whether most episodes have to gain: a ball goes another way at the least provocation, and what explains some of that hits a few episodes and
-    /// misses others. Where nothing rolls, a drift or an obstacle may rightly show in few.
+    /// Whether most episodes have to gain, and held-out ones to have a gap: a ball goes another way at the least provocation, and what explains some of
+    /// that hits a few episodes and misses others. Where nothing rolls, a drift or an obstacle may rightly show in few.
     pub(crate) steady: bool,
 }
 
@@ -88,7 +88,8 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
     // What the fitted episodes gained the held-out ones should, too.
     let expected = fitted.iter().sum::<f64>() * episodes.heldout.len() as f64 / episodes.fitted.len().max(1) as f64;
     let kept = heldout.iter().sum::<f64>() > KEPT * expected;
-    let steady = !asked.steady || (kept && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
+    let gap = round.before.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
+    let steady = !asked.steady || (gap && kept && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
     steady && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * asked.least
 }
 

@@ -10,6 +10,9 @@ use nalgebra::DVector;
 /// White residuals of some episodes, one vector each.
 pub type Stack = Vec<DVector<f64>>;
 
+/// Mean square of the white residuals of a right model.
+pub const NOISE_FLOOR: f64 = 1.0;
+
 /// Those at `places`.
 #[must_use]
 pub fn pick(stack: &Stack, places: &[usize]) -> Stack {

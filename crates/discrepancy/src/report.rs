@@ -6,6 +6,7 @@ use serde::Serialize;
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::evidence::Evidence;
 use crate::interval::{bootstrap, middle_90, widen};
+use crate::likelihood::NOISE_FLOOR;
 use crate::locate::Cell;
 use crate::separate;
 
@@ -127,10 +128,11 @@ pub struct Report {
     pub seconds: f64,
 }
 
-/// Held-out mean square of noise: residuals are standardised.
-const NOISE_FLOOR: f64 = 1.0;
 /// A model that closes more of the gap than this explains it, whatever the solver's errors leave.
 const CLOSED: f64 = 0.95;
+
+/// The same where what is left is small.
+const NEARLY_CLOSED: f64 = 0.9;
 
 /// An effect that closes less than this of a gap stands for something else.
 const HALF: f64 = 0.5;
@@ -152,9 +154,12 @@ impl Report {
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
         widen(&mut samples, &diagnosis.model);
         let effects = effects(diagnosis, &samples);
-        let beside_it = !effects.is_empty() && before > settings.gap && typical_closing(diagnosis, settings.gap) < HALF;
+        // A body in the way shows in the episodes that meet it, whatever the others lack.
+        let everywhere = diagnosis.model.model.parts.iter().any(|part| part.begin.is_none());
+        let beside_it = everywhere && before > settings.gap && typical_closing(diagnosis, settings.gap) < HALF;
         let odd = effects.is_empty() && diagnosis.heldout_episodes.iter().any(|(_, _, after)| *after > settings.odd);
-        let unexplained = beside_it || odd || (left > settings.unexplained && closed_fraction < CLOSED);
+        let chance = diagnosis.remaining.iter().map(|cell| cell.p_value).fold(1.0, f64::min);
+        let unexplained = beside_it || odd || is_left(left, chance, closed_fraction, settings);
         let verdict = match (unexplained, effects.is_empty()) {
             (true, _) => Verdict::Unknown,
             (false, true) => Verdict::None,
@@ -188,6 +193,14 @@ impl Report {
             seconds,
         }
     }
+}
+
+/// Whether what a model leaves is no noise: much in most episodes, or little that all have in the same channel and phase, with this chance of standing
+/// out under a right model.
+fn is_left(trimmed_mean: f64, chance: f64, closed_fraction: f64, settings: &Settings) -> bool {
+    let much = trimmed_mean > settings.unexplained && closed_fraction < CLOSED;
+    let little = chance < settings.left_by_chance && closed_fraction < NEARLY_CLOSED;
+    much || little
 }
 
 /// The mean of all but the largest [`ODD`] of them: an odd episode is not explained by the truth either.
@@ -318,4 +331,19 @@ fn describe(remaining: &[Cell]) -> String {
         })
         .collect();
     worst.join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn much_is_left_whatever_stands_out_and_little_where_it_stands_out() {
+        let settings = Settings::default();
+        let left = |trimmed_mean, chance, closed| is_left(trimmed_mean, chance, closed, &settings);
+        assert!(left(1.5, 1.0, 0.5) && left(1.05, 0.001, 0.5));
+        // Noise, as it comes; what is nearly closed.
+        assert!(!left(1.05, 0.05, 0.5) && !left(1.05, 0.001, 0.95) && !left(1.5, 1.0, 0.96));
+        assert!(left(1.5, 0.001, 0.93), "much is left");
+    }
 }
