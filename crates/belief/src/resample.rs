@@ -20,7 +20,7 @@ pub(crate) struct Quota {
 ///
 /// Each likely structure κ gets n_κ particles of weight P_κ / n_κ, where P_κ is its probability: however the n_κ are chosen, the expected
 /// weight of every particle stays what it was. The unlikely ones are drawn as one group. Equal weights within a group replace the
-/// old ones. A group so light that its equal weights underflow to 0 is not drawn: no particle has the weight 0.
+/// old ones. A group so light that they could underflow to 0 is not drawn, and leaves its draws to the others: no particle has the weight 0.
 pub(crate) fn resample(
     weights: &[f64],
     kinds: &[usize],
@@ -54,14 +54,15 @@ pub(crate) fn resample_with_shares(
             members[group_of[kind]].push(index);
         }
     }
-    let group_mass: Vec<f64> = members.iter().map(|m| m.iter().map(|&i| weights[i]).sum()).collect();
+    let mass_of = |members: &Vec<usize>| members.iter().map(|&i| weights[i]).sum::<f64>();
+    let divisible = |mass: f64| if mass / count as f64 > 0.0 { mass } else { 0.0 };
+    let group_mass: Vec<f64> = members.iter().map(mass_of).map(divisible).collect();
     let counts = allocate(&group_mass, structures, count, quota.particles);
     let mut drawn = Vec::with_capacity(count);
     for ((members, &count), &mass) in members.iter().zip(&counts).zip(&group_mass) {
-        let weight = mass / count.max(1) as f64;
-        if count > 0 && weight > 0.0 {
+        if count > 0 {
             let chosen = stratified(members.iter().map(|&i| weights[i]), mass, count, rng);
-            drawn.extend(chosen.into_iter().map(|at| (members[at], weight)));
+            drawn.extend(chosen.into_iter().map(|at| (members[at], mass / count as f64)));
         }
     }
     let new_weight = |&group: &usize| group_mass[group] / counts[group].max(1) as f64;
@@ -196,7 +197,7 @@ mod tests {
         let weights = [0.5, 0.5, f64::from_bits(1)];
         for (quota, threshold) in [(4, 0.0), (4, 0.5), (1, 0.0)] {
             let drawn = resample(&weights, &[0, 0, 1], 2, 16, Quota { particles: quota, threshold }, &mut rng(3));
-            assert!(drawn.iter().all(|&(_, w)| w > 0.0), "{quota} {threshold}: {drawn:?}");
+            assert!(drawn.len() == 16 && drawn.iter().all(|&(_, w)| w > 0.0), "{quota} {threshold}: {drawn:?}");
             assert!((drawn.iter().map(|(_, w)| w).sum::<f64>() - 1.0).abs() < 1e-12);
         }
     }

@@ -113,10 +113,10 @@ pub(crate) fn best_places(
     for i in 0..cells(0) {
         for j in 0..cells(1) {
             let place = [low[0] + i as f64 * grid_m, low[1] + j as f64 * grid_m];
-            found.extend(radii_m.iter().map(|radius_m| (score(place, *radius_m), (place, *radius_m))));
+            let scored = radii_m.iter().map(|radius_m| (score(place, *radius_m), (place, *radius_m)));
+            found.extend(scored.filter(|(score, _)| *score > 0.0));
         }
     }
-    found.retain(|(score, _)| *score > 0.0);
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<Place> = Vec::new();
     for (_, place) in found {

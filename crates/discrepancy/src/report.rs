@@ -319,8 +319,15 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
     }
 }
 
+/// Cells that a description of what is left names.
+const LARGEST: usize = 3;
+
 fn describe(remaining: &[Cell]) -> String {
-    let worst: Vec<String> = (remaining.iter().take(3))
+    // The largest shares, and what stands out most: it may have decided.
+    let surest = remaining.iter().enumerate().skip(LARGEST).min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value));
+    let surer = |p_value: f64| remaining.iter().take(LARGEST).all(|cell| p_value < cell.p_value);
+    let surest = surest.map(|(_, cell)| cell).filter(|cell| surer(cell.p_value));
+    let worst: Vec<String> = (remaining.iter().take(LARGEST).chain(surest))
         .map(|cell| {
             let (channel, phase) = (cell.channel.name(), cell.phase.name());
             format!(

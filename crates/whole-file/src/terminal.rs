@@ -1,4 +1,4 @@
-//! What programs say: a closed pipe is a reader who has seen enough.
+//! What programs say, and what they do when interrupted.
 
 use std::fmt::Display;
 use std::io::{self, Write as _};

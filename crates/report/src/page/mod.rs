@@ -15,9 +15,9 @@ pub use run::run_page;
 pub use suite::{Suite, suite_page};
 
 /// What every page begins with.
-const BEGINNING: &str = "<!DOCTYPE html>\n";
+const BEGINNING: &str = "<!DOCTYPE html>";
 
-/// Whether a page may be written there: nothing is, or an older page, or what no page can replace.
+/// Whether a page may be written there: nothing is, or an older page, or what cannot be opened, which writing will say.
 #[must_use]
 pub fn may_be_replaced(file: &Path) -> bool {
     let mut start = [0; BEGINNING.len()];
@@ -33,7 +33,7 @@ pub fn may_be_replaced(file: &Path) -> bool {
 fn page(title: &str, body: &str) -> String {
     let title = escape(title);
     format!(
-        "{BEGINNING}<html lang=\"en\"><head><meta charset=\"utf-8\"/>\
+        "{BEGINNING}\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/><title>{title}</title>\n\
          <style>\n{}</style></head>\n<body><main>\n<h1>{title}</h1>\n{body}</main></body></html>\n",
         include_str!("style.css")

@@ -60,3 +60,18 @@ fn a_run_and_an_episode_have_their_parts() {
     check_structure(&html);
     assert!(html.contains("id=\"table1\"") && html.contains("id=\"table2\""));
 }
+
+#[test]
+fn pages_alone_may_be_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    assert!(may_be_replaced(&folder.path().join("none.html")));
+    assert!(may_be_replaced(&file("page.html", &episode_page(&EpisodeTrace::default(), ""))));
+    assert!(!may_be_replaced(&file("trials.jsonl", "{}\n")));
+    assert!(!may_be_replaced(&file("short", "<!DOC")));
+    assert!(!may_be_replaced(folder.path()));
+}
