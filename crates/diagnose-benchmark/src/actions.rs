@@ -118,6 +118,8 @@ pub struct Scene {
     pub face_m: f64,
     /// Half the width of the object across the push, m.
     pub half_width_m: f64,
+    /// Whether what is touched rolls away.
+    pub rolls: bool,
     /// Centre of the scene, m.
     pub centre_m: [f64; 2],
 }
@@ -179,6 +181,14 @@ struct Push {
     creeps: bool,
 }
 
+/// To the object and a little on, a stop, and on slower than what sticks lets go at. Who creeps towards an object instead measures where it begins to
+/// a tenth of a millisecond's way: there the smallest error of a pose is as good as any friction.
+fn creep(scene: &Scene, path: &mut Path, at: impl Fn(f64) -> [f64; 3]) {
+    path.go(at(-scene.face_m + 0.008), 0.03, 0.1);
+    path.wait(0.2);
+    path.go(at(-scene.face_m + 0.01), 0.0003, 0.1);
+}
+
 /// A push: to the object, on, a short brake, back, a rest.
 fn push(scene: &Scene, place_m: [f64; 2], push: Push) -> Vec<[f64; 3]> {
     let Push { angle_rad, aside_m, speed_mps, distance_m, creeps } = push;
@@ -190,8 +200,7 @@ fn push(scene: &Scene, place_m: [f64; 2], push: Push) -> Vec<[f64; 3]> {
     let mut path = Path::from(scene.period_secs, at(begin));
     path.wait(0.2);
     if creeps {
-        path.go(at(-scene.face_m - 0.0005), 0.1, 0.1);
-        path.go(at(-scene.face_m + 0.0015), 0.0003, 0.1);
+        creep(scene, &mut path, at);
     }
     path.go(at(-scene.touch_m + distance_m), speed_mps, 0.04);
     path.wait(0.15);
@@ -212,7 +221,7 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
             // Through the middle, left and right of it.
             let aside = [0.0, 0.35, -0.35][(direction as usize + s) % 3] * scene.half_width_m;
             // What turns is not met where its face would be.
-            let creeps = s == 0 && direction % 2 == 0;
+            let creeps = s == 0 && direction % 2 == 0 && !scene.rolls;
             let way = Push { angle_rad: angle, aside_m: aside, speed_mps: speed, distance_m: 0.08, creeps };
             let commands = push(scene, place_m, way);
             let yaw_rad = if direction % 2 == 0 { 0.0 } else { 0.6 * draw() } + angle;
@@ -245,9 +254,10 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
         let at = |along: f64| [place_m[0] + along * cos, place_m[1] + along * sin, scene.tool_height_m];
         let mut path = Path::from(scene.period_secs, at(-(scene.touch_m + 0.03)));
         path.wait(0.2);
-        path.go(at(-scene.face_m - 0.0005), 0.1, 0.1);
-        path.go(at(-scene.face_m + 0.0015), 0.0003, 0.1);
-        path.go(at(-scene.face_m + 0.0135), 0.006, 0.1);
+        if !scene.rolls {
+            creep(scene, &mut path, at);
+        }
+        path.go(at(-scene.face_m + 0.022), 0.006, 0.1);
         path.go(at(-(scene.face_m + 0.02)), 0.1, 0.1);
         path.wait(0.2);
         scripts.push(Script { place_m, lift_m: 0.0, yaw_rad: angle, added_mass_kg: 0.0, commands: path.points });

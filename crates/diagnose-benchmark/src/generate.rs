@@ -111,6 +111,7 @@ impl SetSpec {
             tool_height_m: table_m + self.shape.half_height_m(size_m).max(tool_m + 0.005).min(0.03),
             touch_m: reach_m + tool_m,
             face_m: if self.shape == ObjectShape::Box { 0.5 * size_m[0] } else { reach_m } + tool_m,
+            rolls: self.shape == ObjectShape::Sphere,
             half_width_m: if self.shape == ObjectShape::Box { 0.03 } else { 0.7 * reach_m },
             centre_m: match self.robot {
                 RobotName::None => [0.0, 0.0],
@@ -238,6 +239,7 @@ pub fn generate_part(spec: &SetSpec, root: Option<&Path>, count: usize) -> Resul
         },
         tick_steps: refinement,
         tool,
+        tool_slip_mps: 0.0,
     };
     let [mass, friction] = spec.nominal_errors;
     let shape = RigShape::Solid { shape: spec.shape, size_m: spec.size_m() };

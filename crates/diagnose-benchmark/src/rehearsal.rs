@@ -42,6 +42,7 @@ pub fn record(problem: &Problem, actions: Actions, seed: Seed) -> Result<Log, Re
         tool_height_m: scenario.task.tool_start_m[2],
         touch_m: reach_m + tool_m,
         face_m: if object.shape == ObjectShape::Box { 0.5 * object.size_m[0] } else { reach_m } + tool_m,
+        rolls: object.shape == ObjectShape::Sphere,
         half_width_m: if object.shape == ObjectShape::Box { 0.5 * object.size_m[1] } else { 0.7 * reach_m },
         centre_m: [places.x_m.mean, places.y_m.mean],
     };
@@ -57,6 +58,7 @@ pub fn record(problem: &Problem, actions: Actions, seed: Seed) -> Result<Log, Re
             world: WorldConfig { control_steps: 1, ..config.clone() },
             tick_steps: 1,
             tool: RigTool::Arm(Arc::new(problem.truth.robot().clone())),
+            tool_slip_mps: 0.0,
         },
         object: RigObject::new(shape, object.mass_kg, object.friction),
         effects: scenario.effects.truth.iter().map(EffectConfig::build).collect(),

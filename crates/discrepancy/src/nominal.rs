@@ -33,6 +33,8 @@ pub struct Engine {
     pub contact_damping_ratio: f64,
     /// Whether what is pushed bears on four fixed points (see [`RigObject::on_points`]): without them the yaw of a cylinder is a gamble.
     pub on_points: bool,
+    /// Slip, m/s, below which the friction of tool and object is in proportion to it; 0: it sticks (see [`Rig::tool_slip_mps`]).
+    pub tool_slip_mps: f64,
 }
 
 impl Default for Engine {
@@ -44,6 +46,7 @@ impl Default for Engine {
             contact_frequency_hz: 60.0,
             contact_damping_ratio: 5.0,
             on_points: true,
+            tool_slip_mps: 0.0,
         }
     }
 }
@@ -218,7 +221,7 @@ impl Nominal {
             restitution: 0.0,
             obstacle_mobility: ObstacleMobility::Movable,
         };
-        Rig { world, tick_steps: steps, tool: self.tool.clone() }
+        Rig { world, tick_steps: steps, tool: self.tool.clone(), tool_slip_mps: engine.tool_slip_mps }
     }
 
     /// The object with coordinates `z` and a known weight.

@@ -29,8 +29,12 @@ const ERROR_SCALE: f64 = 1.5;
 /// How much stiffer contacts may be, and less damped: one standard deviation. What is much softer than the model shall be named.
 const STIFFER: f64 = 1.5;
 
+/// Slip below which a tool may let go. How much of a push it lifts or presses down where nothing slips sideways is indeterminate: an engine keeps what
+/// the first touch left for good, another relaxes it.
+const LETS_GO_MPS: f64 = 0.002;
+
 /// Settings under which a right model's answers should not differ, with the standard deviation of the error in such differences.
-fn variants(engine: &Engine) -> [(Engine, f64); 6] {
+fn variants(engine: &Engine) -> [(Engine, f64); 7] {
     [
         (Engine { refinement: 2 * engine.refinement, ..*engine }, ERROR_SCALE),
         (Engine { refinement: 3 * engine.refinement, solver_iterations: 2, ..*engine }, ERROR_SCALE),
@@ -38,6 +42,7 @@ fn variants(engine: &Engine) -> [(Engine, f64); 6] {
         (Engine { contact_frequency_hz: STIFFER * engine.contact_frequency_hz, ..*engine }, 1.0),
         (Engine { contact_damping_ratio: engine.contact_damping_ratio / STIFFER, ..*engine }, 1.0),
         (Engine { on_points: !engine.on_points, ..*engine }, ERROR_SCALE),
+        (Engine { tool_slip_mps: LETS_GO_MPS, ..*engine }, ERROR_SCALE),
     ]
 }
 

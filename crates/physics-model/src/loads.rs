@@ -131,6 +131,8 @@ pub(crate) struct RigFriction {
     pub(crate) coefficient: f32,
     /// What gravity adds to a speed in a step, m/s.
     pub(crate) fall_mps: f32,
+    /// Slip below which friction of that pair is in proportion to it, m/s; 0: never.
+    pub(crate) slip_mps: f32,
 }
 
 impl RigFriction {
@@ -139,21 +141,29 @@ impl RigFriction {
         let [first, second] = found.map(|handle| handle.and_then(|handle| bodies.get(handle)));
         let Some(manifold) = context.rigid_mut() else { return };
         let [a, b] = self.pair.map(Some);
+        let normal = *manifold.normal;
+        let velocity = |contact: &SolverContact| {
+            let point = (contact.anchor1 + contact.anchor2) * 0.5;
+            let of = |body: Option<&RigidBody>| body.map_or(Vector::ZERO, |b| b.velocity_at_point(point));
+            of(first) - of(second)
+        };
         if found == [a, b] || found == [b, a] {
             *manifold.friction = self.coefficient;
+            if self.slip_mps > 0.0 {
+                let slip = |contact: &SolverContact| velocity(contact).reject_from_normalized(normal).length();
+                let fastest = manifold.solver_contacts.iter().map(slip).fold(0.0, f32::max);
+                *manifold.friction *= (fastest / self.slip_mps).min(1.0);
+            }
         }
         if *manifold.restitution == 0.0 || manifold.solver_contacts.is_empty() {
             return;
         }
-        let normal = *manifold.normal;
         let bounce = |contact: &SolverContact| {
             // As the engine decides: what was pushed before rests.
             if contact.contact_id[0] & NEW_CONTACT_BIT == 0 {
                 return 0.0;
             }
-            let point = (contact.anchor1 + contact.anchor2) * 0.5;
-            let velocity = |body: Option<&RigidBody>| body.map_or(Vector::ZERO, |b| b.velocity_at_point(point));
-            let speed = (velocity(first) - velocity(second)).dot(normal).max(0.0);
+            let speed = velocity(contact).dot(normal).max(0.0);
             // The rest of the first part is what holds the weight.
             speed / (speed + self.fall_mps)
         };

@@ -153,8 +153,17 @@ impl<'a> World<'a> {
             pair: [world.tool, world.object.handle],
             coefficient: world.config.tool_friction as f32,
             fall_mps: fall_mps as f32,
+            slip_mps: 0.0,
         });
         world
+    }
+
+    /// The same with a tool that lets go of what slips less than this, see [`crate::rig::Rig::tool_slip_mps`].
+    pub(crate) fn letting_go(mut self, tool_slip_mps: f64) -> Self {
+        if let Some(friction) = &mut self.rig_friction {
+            friction.slip_mps = tool_slip_mps as f32;
+        }
+        self
     }
 
     fn build(

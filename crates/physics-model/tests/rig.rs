@@ -31,7 +31,7 @@ fn rig(tool: RigTool) -> Rig {
         restitution: 0.0,
         obstacle_mobility: ObstacleMobility::Fixed,
     };
-    Rig { world, tick_steps: 2, tool }
+    Rig { world, tick_steps: 2, tool, tool_slip_mps: 0.0 }
 }
 
 fn ball() -> Rig {

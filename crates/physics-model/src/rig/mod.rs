@@ -55,6 +55,9 @@ pub struct Rig {
     pub tick_steps: u32,
     /// What moves by command.
     pub tool: RigTool,
+    /// Slip, m/s, below which the friction of tool and object is in proportion to it, so that it lets go of what does not slip; 0: Coulomb's, which
+    /// sticks.
+    pub tool_slip_mps: f64,
 }
 
 /// What moves by command.
