@@ -6,6 +6,7 @@ use nalgebra::DVector;
 use pomdp::{Purpose, Seed};
 use rand_distr::{Distribution as _, StandardUniform};
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::fit::Fit;
 use crate::simulator::{Nudge, Simulator};
@@ -13,8 +14,12 @@ use crate::trial::{Kind, Phase, groups};
 
 /// So many residuals with a mean square of 1 are added to each episode's.
 const FEW: f64 = 5.0;
-/// Random flips of signs.
-const FLIPS: usize = 999;
+/// Random flips of signs, where there are fewer than ways to flip them.
+const FLIPS: usize = 9_999;
+/// Up to so many episodes every way is tried.
+const FEW_EPISODES: usize = 13;
+/// Of three episodes one flip in eight is as good as it gets.
+const LEAST_EPISODES: usize = 4;
 /// Parts that an episode is cut into for the heat map.
 pub const TIMES: usize = 8;
 
@@ -46,9 +51,8 @@ struct Sums {
 
 /// The cells of a fit, the largest share first.
 ///
-/// Whether a cell stands out is judged between episodes, never between samples. An episode's excess is the logarithm of its mean square, drawn
-/// towards 0 where it has few residuals, so that one odd episode does not hide what all show; under the hypothesis that nothing is wrong its sign
-/// is a toss of a coin. The largest statistic of all cells under such tosses is what each is compared with.
+/// Whether a cell stands out is judged between episodes, never between samples: an episode's excess is the logarithm of its mean square, drawn
+/// towards 0 where it has few residuals, so that one odd episode does not hide what all show (see [`chances`]).
 #[must_use]
 pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> Vec<Cell> {
     let rolls = simulator.nominal.rolls();
@@ -76,47 +80,123 @@ pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> 
             time.1 += 1;
         }
     }
-    let excess: Vec<Vec<f64>> = (cells.values())
+    let excess: Vec<Vec<Option<f64>>> = (cells.values())
         .map(|sums| {
-            let one = |(square, count): &(f64, usize)| ((square + FEW) / (*count as f64 + FEW)).ln();
-            sums.episodes.iter().filter(|(_, count)| *count > 0).map(one).collect()
+            let one =
+                |(square, count): &(f64, usize)| (*count > 0).then(|| ((square + FEW) / (*count as f64 + FEW)).ln());
+            sums.episodes.iter().map(one).collect()
         })
         .collect();
-    let mut rng = Seed(seed).stream(Purpose::Statistics, 1);
-    let statistic = |excess: &[f64], signs: Option<&[bool]>| {
-        let value = |i: usize| if signs.is_some_and(|signs| signs[i]) { -excess[i] } else { excess[i] };
-        let n = excess.len() as f64;
-        if n < 4.0 {
-            // Of three episodes one toss in eight is as good as it gets.
-            return 0.0;
-        }
-        let mean = (0..excess.len()).map(value).sum::<f64>() / n;
-        let square = excess.iter().map(|e| e * e).sum::<f64>() / n;
-        let variance = (square - mean * mean).max(1e-12) / (n - 1.0).max(1.0);
-        mean / variance.sqrt()
-    };
-    let mut largest: Vec<f64> = (0..FLIPS)
-        .map(|_| {
-            let signs: Vec<bool> = (0..groups.len()).map(|_| StandardUniform.sample(&mut rng)).collect();
-            excess.iter().map(|excess| statistic(excess, Some(&signs))).fold(f64::NEG_INFINITY, f64::max)
-        })
-        .collect();
-    largest.sort_by(f64::total_cmp);
+    let chances = chances(&excess, groups.len(), seed);
     let total: f64 = cells.values().map(|sums| (sums.square - sums.count as f64).max(0.0)).sum();
-    let mut list: Vec<Cell> = (cells.iter().zip(&excess))
-        .map(|(((channel, phase), sums), excess)| {
-            let found = statistic(excess, None);
-            let beyond = FLIPS - largest.partition_point(|value| *value < found);
-            Cell {
-                channel: *channel,
-                phase: *phase,
-                share: if total > 0.0 { (sums.square - sums.count as f64).max(0.0) / total } else { 0.0 },
-                mean_square: sums.square / sums.count as f64,
-                p_value: (beyond + 1) as f64 / (FLIPS + 1) as f64,
-                over_time: sums.times.map(|(square, count)| (count > 0).then(|| square / count as f64)),
-            }
+    let mut list: Vec<Cell> = (cells.iter().zip(chances))
+        .map(|(((channel, phase), sums), p_value)| Cell {
+            channel: *channel,
+            phase: *phase,
+            share: if total > 0.0 { (sums.square - sums.count as f64).max(0.0) / total } else { 0.0 },
+            mean_square: sums.square / sums.count as f64,
+            p_value,
+            over_time: sums.times.map(|(square, count)| (count > 0).then(|| square / count as f64)),
         })
         .collect();
     list.sort_by(|a, b| b.share.total_cmp(&a.share));
     list
+}
+
+/// Chance, for each cell, that some cell would stand out as much although nothing is wrong. `excess`: of each cell in each of so many episodes, where it
+/// was read.
+///
+/// Under the hypothesis that nothing is wrong the sign of an episode is a toss of a coin, the same for all its cells: a permutation test over episodes,
+/// with the least chance of all cells for its statistic (Westfall & Young, Resampling-Based Multiple Testing, 1993). A cell's chance by itself is that
+/// of Student's t of its excesses, but no less than one in as many ways as their signs can fall.
+fn chances(excess: &[Vec<Option<f64>>], episodes: usize, seed: u64) -> Vec<f64> {
+    let cells: Vec<Tossed> = excess.iter().map(|excess| Tossed::new(excess)).collect();
+    let alone = |negative: &[bool]| cells.iter().map(|cell| cell.chance(negative)).fold(1.0, f64::min);
+    let mut least: Vec<f64> = if episodes <= FEW_EPISODES {
+        let way = |bits: usize| -> Vec<bool> { (0..episodes).map(|episode| bits >> episode & 1 == 1).collect() };
+        (1..1 << episodes).map(|bits| alone(&way(bits))).collect()
+    } else {
+        let mut rng = Seed(seed).stream(Purpose::Statistics, 1);
+        let mut toss = || -> Vec<bool> { (0..episodes).map(|_| StandardUniform.sample(&mut rng)).collect() };
+        (0..FLIPS).map(|_| alone(&toss())).collect()
+    };
+    least.sort_by(f64::total_cmp);
+    let as_measured = vec![false; episodes];
+    let of = |cell: &Tossed| {
+        let found = cell.chance(&as_measured);
+        // What was measured is one of the ways.
+        (least.partition_point(|chance| *chance <= found * (1.0 + 1e-9)) + 1) as f64 / (least.len() + 1) as f64
+    };
+    cells.iter().map(of).collect()
+}
+
+/// The excesses of a cell.
+struct Tossed {
+    /// Episode and excess.
+    excess: Vec<(usize, f64)>,
+    /// Mean of their squares.
+    square: f64,
+    /// Of Student's t.
+    law: Option<StudentsT>,
+}
+
+impl Tossed {
+    fn new(excess: &[Option<f64>]) -> Self {
+        let excess: Vec<(usize, f64)> = excess.iter().enumerate().filter_map(|(i, e)| e.map(|e| (i, e))).collect();
+        let n = excess.len();
+        let law = (n >= LEAST_EPISODES).then(|| StudentsT::new(0.0, 1.0, (n - 1) as f64).ok()).flatten();
+        Self { square: excess.iter().map(|(_, e)| e * e).sum::<f64>() / n.max(1) as f64, excess, law }
+    }
+
+    /// Chance of so large a mean excess, by this cell alone.
+    fn chance(&self, negative: &[bool]) -> f64 {
+        let Some(law) = &self.law else { return 1.0 };
+        let n = self.excess.len() as f64;
+        let mean = self.excess.iter().map(|(episode, e)| if negative[*episode] { -e } else { *e }).sum::<f64>() / n;
+        let variance = (self.square - mean * mean).max(1e-12) / (n - 1.0);
+        law.sf(mean / variance.sqrt()).max((-n).exp2())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_distr::StandardNormal;
+
+    use super::*;
+
+    #[test]
+    fn of_few_episodes_every_way_to_flip_them_counts() {
+        let all = [1.0, 1.1, 0.9, 1.2, 0.8].map(Some).to_vec();
+        // No other of the 32 ways is as good.
+        assert_eq!(chances(&[all.clone()], 5, 1), [1.0 / 32.0]);
+        // What says the same again says no more; what was read in three episodes alone says nothing.
+        let three = [Some(9.0), Some(9.0), Some(9.0), None, None].to_vec();
+        assert_eq!(chances(&[all.clone(), all.clone(), three], 5, 1)[..2], [1.0 / 32.0; 2]);
+        // A cell that lacks an episode is flipped with the others' episodes, not with their places: with the first one's sign alone turned it stands out as much.
+        let lacking = [None, Some(1.1), Some(0.9), Some(1.2), Some(0.8)].to_vec();
+        assert_eq!(chances(&[all, lacking], 5, 1), [1.0 / 32.0, 2.0 / 32.0]);
+    }
+
+    #[test]
+    fn where_nothing_is_wrong_one_log_in_twenty_has_a_chance_below_a_twentieth() {
+        let mut rng = Seed(7).stream(Purpose::Noise, 0);
+        let (logs, episodes) = (400, 24);
+        let mut low = 0;
+        for log in 0..logs {
+            // Cells that share what is odd about an episode, some of which are read in few.
+            let odd: Vec<f64> = (0..episodes).map(|_| StandardNormal.sample(&mut rng)).collect();
+            let cells: Vec<Vec<Option<f64>>> = (0..6)
+                .map(|cell| {
+                    let one = |episode: usize| -> Option<f64> {
+                        let own: f64 = StandardNormal.sample(&mut rng);
+                        (episode % (cell + 1) == 0).then_some(odd[episode] + own)
+                    };
+                    (0..episodes).map(one).collect()
+                })
+                .collect();
+            low += usize::from(chances(&cells, episodes, log).into_iter().any(|chance| chance < 0.05));
+        }
+        // 20 ± 4.4.
+        assert!((7..=33).contains(&low), "{low} of {logs}");
+    }
 }
