@@ -4,13 +4,16 @@ use std::ops::Range;
 
 use nalgebra::DVector;
 
-use crate::diagnosis::{Rival, Round};
 use crate::fit::Fit;
-use crate::interval::bootstrap;
+use crate::interval::{bootstrap, widen};
 use crate::likelihood::{NOISE_FLOOR, episode_cost};
+use crate::rival::{Rival, Round};
 
 /// Share of resamples in which a strength has to have the same sign.
 const SAME_SIGN: f64 = 0.95;
+/// A strength below this, in standard deviations of what is plausible (0.4 mm of an offset, 0.1 % of a scale), is as good as none, however surely it is
+/// not 0: what no model is right about shows in long logs.
+const NEGLIGIBLE: f64 = 0.03;
 /// By chance an effect that no held-out episode shows may explain them worse by this much in ln p.
 const HELDOUT_SLACK: f64 = 1.0;
 /// The same as a share of the gain: the place of an obstacle is not known exactly.
@@ -50,7 +53,8 @@ pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, asked
         && lasts(&rival.fit, &episodes.fitted, seed)
 }
 
-/// Whether the last effect is there whichever episodes are left out: some strength of it has the same sign in nearly all resamples.
+/// Whether the last effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
+/// resamples, as wide as the intervals that are reported.
 fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
     let Some(part) = fit.model.parts.last() else { return false };
     if part.begin.is_some() {
@@ -58,10 +62,11 @@ fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
         return true;
     }
     let first = fit.x.len() - part.coordinates.len();
-    let samples = bootstrap(fit, groups, seed);
+    let mut samples = bootstrap(fit, groups, seed);
+    widen(&mut samples, fit);
     part.strengths().any(|index| {
-        let above = samples.iter().filter(|x| x[first + index] > 0.0).count();
-        above.max(samples.len() - above) as f64 >= SAME_SIGN * samples.len() as f64
+        let beyond = |sign: f64| samples.iter().filter(|x| sign * x[first + index] > NEGLIGIBLE).count();
+        beyond(1.0).max(beyond(-1.0)) as f64 >= SAME_SIGN * samples.len() as f64
     })
 }
 

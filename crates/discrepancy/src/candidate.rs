@@ -12,6 +12,10 @@ use crate::obstacle::Place;
 
 /// Of the distance from the neutral to the farthest plausible value: one standard deviation of the prior of a strength.
 const STRENGTH_SHARE: f64 = 1.0 / 1.5;
+/// How far from neutral, in units, a linear step is measured: far enough to stand out of the solver's grain.
+const REACH: f64 = 0.35;
+/// The same where what a strength does is far from linear.
+const FAR: f64 = 1.2;
 /// Places of a patch that are tried.
 const PATCHES: usize = 6;
 /// Standard deviation of where something is, m, around the place that a fit begins from.
@@ -68,6 +72,8 @@ pub struct Candidate {
     pub coordinates: Vec<Coordinate>,
     /// Coordinates that a fit starts from for what has no small version of itself (a body in the way); `None`: from 0.
     pub begin: Option<Vec<f64>>,
+    /// How far from neutral, in units, the screening measures what a strength does.
+    pub reach: f64,
 }
 
 impl Candidate {
@@ -140,7 +146,7 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
             values[*index] = *value;
         }
         let base = neutral.with_parameters(&values).unwrap_or_else(|_| neutral.clone());
-        Candidate { coordinates: coordinates(&base, context), base, begin: None }
+        Candidate { coordinates: coordinates(&base, context), base, begin: None, reach: REACH }
     };
     match kind {
         // Both harmonics of the direction, either sign: the amplitude has none.
@@ -163,6 +169,10 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         }
         EffectKind::StribeckFriction => [0.02, 0.06].iter().map(|v| with(&[(1, *v)])).collect(),
         EffectKind::HiddenObstacle => obstacles(context),
+        // What a soft contact or a bounce changes is no multiple of what a slightly softer one does.
+        EffectKind::ContactCompliance | EffectKind::Restitution => {
+            [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
+        }
         _ => vec![with(&[])],
     }
 }
@@ -195,7 +205,7 @@ fn obstacles(context: &Context) -> Vec<Candidate> {
                 coordinates.push(unit(6, 0.6, [-1.5, 6.0]));
             }
             let begin = Some(vec![0.0; coordinates.len()]);
-            all.push(Candidate { base, coordinates, begin });
+            all.push(Candidate { base, coordinates, begin, reach: REACH });
         }
     }
     all

@@ -8,7 +8,7 @@ use crate::model::Model;
 use crate::study::{Study, difference};
 
 /// Steps between two fresh Jacobians, at most.
-const STEPS: usize = 5;
+pub(crate) const STEPS: usize = 5;
 /// A fresh Jacobian that gained less than this share of −ln posterior is not followed by another one.
 const LITTLE: f64 = 0.01;
 /// A step that promises less than this in ln posterior is not made.
@@ -103,6 +103,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         Effort::Quick => 1,
         Effort::Full => 3,
     };
+    let groups = study.groups().len();
     let mut before = f64::INFINITY;
     for round in 0..rounds {
         let now = cost(&x, &residuals);
@@ -116,6 +117,9 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         let mut damping = 1e-3;
         let mut moved = false;
         for _ in 0..STEPS {
+            if !study.simulator.affords(groups) {
+                break;
+            }
             let Some(step) = step(&model, &x, &residuals, &jacobian, damping) else { break };
             // A promise that a fresh Jacobian makes is worth more than one of an old one.
             if step.promise < WORTHWHILE || (!moved && round > 0 && step.promise < 6.0 * WORTHWHILE) {
@@ -138,7 +142,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             return Fit { model, x, raw, residuals, jacobian };
         }
     }
-    if effort == Effort::Full && study.simulator.affords(x.len() * study.groups().len()) {
+    if effort == Effort::Full && study.simulator.affords(x.len() * groups) {
         jacobian = derivatives(study, &model, &x, (&raw, &residuals));
     }
     Fit { model, x, raw, residuals, jacobian }

@@ -32,6 +32,24 @@ pub fn episode_cost(chi2: f64, count: usize) -> f64 {
     n * (chi2 / n).ln_1p()
 }
 
+/// Mean square of residuals.
+#[must_use]
+pub fn mean_square(residuals: &[DVector<f64>]) -> f64 {
+    let count: usize = residuals.iter().map(DVector::len).sum();
+    residuals.iter().map(DVector::norm_squared).sum::<f64>() / count.max(1) as f64
+}
+
+/// Share of episodes that may go another way than any model.
+const ODD: f64 = 0.25;
+
+/// The mean of all but the largest [`ODD`] of them: an odd episode is not explained by the truth either.
+#[must_use]
+pub fn trimmed_mean(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.truncate(values.len() - (ODD * values.len() as f64).ceil() as usize);
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
 /// The weight of each episode in a step of least squares: −ln p has the derivative `weight` · residual.
 #[must_use]
 pub fn weights(stack: &Stack) -> Vec<f64> {

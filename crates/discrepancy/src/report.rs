@@ -6,7 +6,7 @@ use serde::Serialize;
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::evidence::Evidence;
 use crate::interval::{bootstrap, middle_90, widen};
-use crate::likelihood::NOISE_FLOOR;
+use crate::likelihood::{NOISE_FLOOR, trimmed_mean};
 use crate::locate::Cell;
 use crate::separate;
 
@@ -138,8 +138,6 @@ const NEARLY_CLOSED: f64 = 0.9;
 const HALF: f64 = 0.5;
 /// In fewer episodes than this a gap may be chance.
 const LEAST_GAPS: usize = 3;
-/// Share of episodes that may go another way than any model.
-const ODD: f64 = 0.25;
 
 impl Report {
     /// What a diagnosis says.
@@ -201,13 +199,6 @@ fn is_left(trimmed_mean: f64, chance: f64, closed_fraction: f64, settings: &Sett
     let much = trimmed_mean > settings.unexplained && closed_fraction < CLOSED;
     let little = chance < settings.left_by_chance && closed_fraction < NEARLY_CLOSED;
     much || little
-}
-
-/// The mean of all but the largest [`ODD`] of them: an odd episode is not explained by the truth either.
-fn trimmed_mean(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.truncate(values.len() - (ODD * values.len() as f64).ceil() as usize);
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// Median over the held-out episodes with a mean square above `gap` of the share of it that is closed; 1 where there are too few to say.

@@ -5,15 +5,15 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use physics_model::EffectKind;
 
-use crate::candidate::{Candidate, Coordinate};
+use crate::candidate::Candidate;
 use crate::fit::Fit;
 use crate::likelihood::{self, Stack, dot, weights};
 use crate::study::{Study, difference};
 
 /// Episodes that the screening looks at, at most.
 const EPISODES: usize = 10;
-/// How far from neutral, in units, the linear step is measured: far enough to stand out of the solver's grain.
-const REACH: f64 = 0.35;
+/// An episode lasts long if it does so many times as long as the mean.
+const LONG: f64 = 3.0;
 
 /// What a linear step says of a candidate.
 #[derive(Clone, Debug)]
@@ -70,7 +70,7 @@ impl Screening {
                             .strengths()
                             .map(|index| {
                                 let mut a = vec![0.0; candidate.coordinates.len()];
-                                a[index] = reach(&candidate.coordinates[index]);
+                                a[index] = reach(candidate, index);
                                 change(&a)
                             })
                             .collect(),
@@ -102,7 +102,7 @@ impl Screening {
                     }
                     Columns::Linear(columns) => {
                         let strengths: Vec<usize> = candidate.strengths().collect();
-                        let reach = |index: &usize| reach(&candidate.coordinates[*index]);
+                        let reach = |index: &usize| reach(candidate, *index);
                         let white: Vec<Stack> = (columns.iter().zip(&strengths))
                             .map(|(change, index)| difference(&moved(change), &residuals, reach(index)))
                             .collect();
@@ -123,20 +123,21 @@ impl Screening {
 }
 
 /// The change of a strength that is simulated.
-fn reach(coordinate: &Coordinate) -> f64 {
-    if coordinate.range[1] >= REACH { REACH } else { -REACH }
+fn reach(candidate: &Candidate, index: usize) -> f64 {
+    if candidate.coordinates[index].range[1] >= candidate.reach { candidate.reach } else { -candidate.reach }
 }
 
-/// The best of each kind, as many kinds as asked for; of what is tied to a place two: a fit does not find the way from afar.
+/// The best of each kind, as many kinds as asked for; of what is tied to a place, or far from linear, two: a fit does not find the way from afar.
 #[must_use]
 pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
+    use EffectKind as K;
     let mut kinds: Vec<EffectKind> = Vec::new();
     let mut list = Vec::new();
     for promise in promises.iter().filter(|promise| promise.gain > 0.0) {
         let kind = promise.candidate.kind();
         let before = kinds.iter().filter(|other| **other == kind).count();
-        let placed = promise.candidate.begin.is_some() || kind == EffectKind::FrictionPatch;
-        let most = if placed { 2 } else { 1 };
+        let several = matches!(kind, K::FrictionPatch | K::ContactCompliance | K::Restitution);
+        let most = if several || promise.candidate.begin.is_some() { 2 } else { 1 };
         if before < most && (before > 0 || list.len() < count) {
             kinds.push(kind);
             list.push(promise.clone());
@@ -145,13 +146,21 @@ pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
     list
 }
 
-/// Pieces of the episodes to look at, which are evenly spread over those sorted by how badly the nominal model fails them.
+/// Pieces of the episodes to look at, which are evenly spread over those sorted by how badly the nominal model fails them. Of those that last much longer
+/// than most one is enough: each costs as much as several others.
 fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
     let groups = study.groups();
     let failure =
         |group: &Range<usize>| nominal.residuals[group.clone()].iter().map(DVector::norm_squared).sum::<f64>();
+    let ticks = |group: &Range<usize>| -> usize {
+        group.clone().map(|place| study.simulator.trials[study.chosen[place]].ticks).sum()
+    };
+    let mean = groups.iter().map(ticks).sum::<usize>() as f64 / groups.len().max(1) as f64;
+    let long = |group: &Range<usize>| ticks(group) as f64 > LONG * mean;
     let mut order: Vec<usize> = (0..groups.len()).collect();
     order.sort_by(|a, b| failure(&groups[*b]).total_cmp(&failure(&groups[*a])));
+    let worst = order.iter().copied().find(|group| long(&groups[*group]));
+    order.retain(|group| !long(&groups[*group]) || Some(*group) == worst);
     let count = order.len().min(EPISODES);
     let mut places: Vec<usize> = (0..count).flat_map(|i| groups[order[i * order.len() / count]].clone()).collect();
     places.sort_unstable();

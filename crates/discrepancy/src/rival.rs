@@ -1,0 +1,56 @@
+//! What a round of the search compares.
+
+use physics_model::EffectKind;
+
+use crate::fit::Fit;
+use crate::screen::Promise;
+
+/// A fitted model with a further effect.
+#[derive(Clone, Debug)]
+pub struct Rival {
+    /// Its fit; the further effect is the last of the model's parts.
+    pub fit: Fit,
+    /// ln evidence over that of the model without.
+    pub gain: f64,
+    /// Sums of squares of the held-out episodes.
+    pub heldout: Vec<f64>,
+}
+
+impl Rival {
+    /// The further effect.
+    ///
+    /// # Panics
+    ///
+    /// Never: a rival has one.
+    #[must_use]
+    pub fn kind(&self) -> EffectKind {
+        self.fit.model.parts.last().expect("a rival has an effect").kind()
+    }
+}
+
+/// What a round of the search compared.
+#[derive(Debug)]
+pub struct Round {
+    /// What each candidate promised by a linear step.
+    pub promises: Vec<Promise>,
+    /// The fitted ones, the most probable first.
+    pub rivals: Vec<Rival>,
+    /// The model that they were added to, with the same errors.
+    pub base: Fit,
+    /// Sums of squares of the held-out episodes under that model.
+    pub before: Vec<f64>,
+    /// Whether the rivals were compared in haste: a second effect seemed to be missing.
+    pub hasty: bool,
+}
+
+impl Round {
+    /// The fit of the first rival, or that of the model without one.
+    pub(crate) fn best(&self, found: bool) -> &Fit {
+        self.rivals.first().filter(|_| found).map_or(&self.base, |rival| &rival.fit)
+    }
+}
+
+/// The most probable first.
+pub(crate) fn sort(rivals: &mut [Rival]) {
+    rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+}

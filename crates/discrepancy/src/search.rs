@@ -1,0 +1,332 @@
+//! The search for effects: rounds of screening, quick fits, fits with care, and a decision.
+
+use nalgebra::DVector;
+use physics_model::{EffectConfig, EffectKind};
+
+use crate::accept::{Asked, Episodes, convinces};
+use crate::begin::{begin, follow, shake};
+use crate::candidate::Candidate;
+use crate::diagnosis::Settings;
+use crate::fit::{Begin, Effort, Fit, STEPS, cost, fit};
+use crate::likelihood::{mean_square, trimmed_mean};
+use crate::locate::{Cell, locate};
+use crate::rival::{Rival, Round, sort};
+use crate::screen::{Promise, Screening, shortlist};
+use crate::study::Study;
+
+/// What a further effect has to gain, as a share of what those before it did.
+const SECOND_SHARE: f64 = 0.01;
+/// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
+const NEAR: f64 = 60.0;
+/// What promises less than this share of what another one gains is not fitted...
+const HOPELESS: f64 = 0.1;
+/// ... but for the first two.
+const LEAST_FITS: usize = 2;
+/// A null that leaves more than this share of the best effect's gain unexplained was no place to learn errors at.
+const FAR: f64 = 100.0;
+
+/// The search for effects.
+pub(crate) struct Search<'a> {
+    /// Episodes that models are fitted to.
+    pub(crate) study: Study<'a>,
+    /// Those held out.
+    pub(crate) kept: Study<'a>,
+    /// What it may do.
+    pub(crate) settings: &'a Settings,
+}
+
+impl Search<'_> {
+    /// Sums of squares of the held-out episodes.
+    pub(crate) fn heldout(&self, fit: &Fit) -> Vec<f64> {
+        let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
+        self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
+    }
+
+    /// Adds effects to the re-tuned nominal model, as long as one convinces and what it leaves stands out; the model with them, what was compared, and
+    /// what the model leaves where that is known.
+    pub(crate) fn effects(
+        &mut self,
+        screening: &Screening,
+        null: &Fit,
+        episodes: &Episodes,
+    ) -> (Fit, Vec<Round>, Option<Vec<Cell>>) {
+        let settings = self.settings;
+        let (mut accepted, mut rounds, mut explained, mut remaining) = (null.clone(), Vec::new(), 0.0, None);
+        while accepted.model.parts.len() < settings.effects && self.study.simulator.rollouts() <= settings.rollouts {
+            let mut round = self.round(screening, &accepted);
+            let found = self.choose(&mut round, episodes, explained);
+            // Without another effect the same model, fitted with more care on the way.
+            accepted = round.best(found).clone();
+            explained += round.rivals.first().map_or(0.0, |best| best.gain);
+            rounds.push(round);
+            if !found {
+                remaining = None;
+                break;
+            }
+            if let [first, _] = rounds.as_mut_slice() {
+                accepted = self.exchange(screening, first, accepted);
+            }
+            let cells = self.left(&accepted);
+            let another = self.stands_out(&cells);
+            remaining = Some(cells);
+            if !another {
+                break;
+            }
+        }
+        // One that was fitted in haste for the sake of a second is compared with its rivals if there is none.
+        if let [first, ..] = rounds.as_mut_slice()
+            && accepted.model.parts.len() == 1
+            && first.hasty
+        {
+            self.compare(first);
+            let found = self.choose(first, episodes, 0.0);
+            accepted = first.best(found).clone();
+            remaining = None;
+        }
+        (accepted, rounds, remaining)
+    }
+
+    /// Drops the rivals before the best one that convinces beside effects that gained so much, and says whether one does.
+    fn choose(&self, round: &mut Round, episodes: &Episodes, explained: f64) -> bool {
+        let settings = self.settings;
+        // The errors of a solver grow with what it is asked to explain.
+        let rolls = self.study.simulator.nominal.rolls();
+        let threshold = if rolls { settings.threshold_rolling } else { settings.threshold };
+        let asked = Asked { least: threshold.max(SECOND_SHARE * explained), steady: rolls };
+        let best = round.rivals.iter().position(|rival| convinces(rival, round, episodes, asked, settings.seed));
+        round.rivals.drain(..best.unwrap_or(0));
+        best.is_some()
+    }
+
+    /// Fits with care what was fitted in haste and what is near it.
+    fn compare(&self, round: &mut Round) {
+        let without = round.base.log_evidence();
+        let lead = round.rivals.first().map_or(0.0, |first| first.gain);
+        for rival in round.rivals.iter_mut().filter(|rival| lead - rival.gain < NEAR) {
+            if self.affords(&rival.fit) {
+                let fit = fit(&self.study, rival.fit.model.clone(), Begin::at(&rival.fit.x), Effort::Full);
+                rival.gain = fit.log_evidence() - without - self.finer_steps(&round.base, &fit);
+                (rival.heldout, rival.fit) = (self.heldout(&fit), fit);
+            }
+        }
+        sort(&mut round.rivals);
+    }
+
+    /// The model of two effects, or a better one with a rival of the first in its place: which of those it was is plainer beside the second.
+    fn exchange(&self, screening: &Screening, first: &mut Round, accepted: Fit) -> Fit {
+        let part = self.study.part(&screening.places);
+        let [_, second] = accepted.model.parts.as_slice() else { return accepted };
+        let own = &accepted.x[accepted.x.len() - second.coordinates.len()..];
+        let beside = |rival: &Rival| -> Fit {
+            let x = [&rival.fit.x, own].concat();
+            fit(&part, rival.fit.model.with(second), Begin::at(&x), Effort::Quick)
+        };
+        let share = self.study.groups().len() as f64 / part.groups().len() as f64;
+        let mut best: Option<(usize, Fit)> = None;
+        let lead = first.rivals.first().map(|rival| (rival.gain, beside(rival).log_evidence()));
+        let Some((gain, evidence)) = lead else { return accepted };
+        for (index, rival) in first.rivals.iter_mut().enumerate().skip(1) {
+            let within = self.study.simulator.rollouts() <= self.settings.rollouts;
+            if !within || rival.kind() == second.kind() {
+                continue;
+            }
+            let pair = beside(rival);
+            rival.gain = gain + share * (pair.log_evidence() - evidence);
+            if rival.gain > gain && best.as_ref().is_none_or(|(_, best)| pair.log_evidence() > best.log_evidence()) {
+                best = Some((index, pair));
+            }
+        }
+        let Some((index, pair)) = best.filter(|(_, pair)| self.affords(pair)) else {
+            sort(&mut first.rivals);
+            return accepted;
+        };
+        let found = fit(&self.study, pair.model, Begin::at(&pair.x), Effort::Quick);
+        if found.log_evidence() <= accepted.log_evidence() {
+            first.rivals[index].gain = gain;
+            sort(&mut first.rivals);
+            return accepted;
+        }
+        sort(&mut first.rivals);
+        found
+    }
+
+    /// Whether a fit of this model to all episodes is within the budget.
+    fn affords(&self, fit: &Fit) -> bool {
+        let simulated = fit.x.len() - fit.model.errors;
+        self.study.simulator.affords((simulated + STEPS + 1) * self.study.groups().len())
+    }
+
+    /// What a model leaves, by channel and phase.
+    fn left(&self, fit: &Fit) -> Vec<Cell> {
+        locate(self.study.simulator, &self.study.chosen, fit, self.settings.seed)
+    }
+
+    /// Whether another effect is worth looking for.
+    fn stands_out(&self, cells: &[Cell]) -> bool {
+        cells.iter().any(|cell| cell.p_value < self.settings.another)
+    }
+
+    /// Compares what could be added to `base`.
+    fn round(&mut self, screening: &Screening, base: &Fit) -> Round {
+        let promises = screening.promises(&self.study, base);
+        let mut quick = self.quick(screening, base, &promises);
+        let before = base.part(&screening.places).log_evidence();
+        let mut base = base.clone();
+        if base.model.parts.is_empty() {
+            let best = quick.first().filter(|best| best.log_evidence() - before > FAR);
+            // How large errors are is learnt where the model is nearly right: with what explains most.
+            let right = best.unwrap_or(&base);
+            let hypothesis = right.model.hypothesis(&right.x);
+            if best.is_some() {
+                self.study.learn_errors(&hypothesis);
+            }
+            self.kept.learn_errors(&hypothesis);
+            let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
+            base = fit(&self.study, base.model, Begin::at(&base.x), effort);
+        }
+        let fits = if base.model.parts.is_empty() { self.settings.fits } else { 1 };
+        quick.truncate(fits);
+        let lead = quick.first().map_or(0.0, Fit::log_evidence);
+        let without = base.log_evidence();
+        let share = base.residuals.len() as f64 / screening.places.len() as f64;
+        // Where the best alone leaves much of the episodes of the screening, a second effect is the question, not by how much the first one leads.
+        let hasty = base.model.parts.is_empty()
+            && quick.first().is_some_and(|best| leaves_much(best, &self.study.part(&screening.places), self.settings));
+        let effort = if hasty { Effort::Quick } else { Effort::Full };
+        let fully = |quick: Fit| -> Rival {
+            if !self.affords(&quick) {
+                return Rival {
+                    heldout: self.heldout(&quick),
+                    gain: share * (quick.log_evidence() - before),
+                    fit: quick,
+                };
+            }
+            let fit = fit(&self.study, quick.model, Begin::at(&quick.x), effort);
+            Rival {
+                heldout: self.heldout(&fit),
+                gain: fit.log_evidence() - without - self.finer_steps(&base, &fit),
+                fit,
+            }
+        };
+        let mut rivals: Vec<Rival> = (quick.into_iter().enumerate())
+            .map(|(rank, quick)| {
+                // Those far behind need no exact optimum: what they gain in the episodes of the screening they gain in all.
+                let gain = quick.log_evidence();
+                let affordable = !hasty && self.study.simulator.rollouts() < self.settings.rollouts;
+                if rank == 0 || (lead - gain < NEAR && affordable) {
+                    fully(quick)
+                } else {
+                    Rival { heldout: self.heldout(&quick), fit: quick, gain: share * (gain - before) }
+                }
+            })
+            .collect();
+        if hasty && let [first, others @ ..] = rivals.as_mut_slice() {
+            // What the others gain in the episodes of the screening is not what a fit to all does, but by how much less than the first it is.
+            let promised = share * (lead - before);
+            others.iter_mut().for_each(|other| other.gain += first.gain - promised);
+        }
+        loop {
+            sort(&mut rivals);
+            // Unless those before do not keep what they promise.
+            match rivals.first() {
+                Some(first) if first.fit.residuals.len() < self.study.chosen.len() && self.affords(&first.fit) => {
+                    let first = rivals.swap_remove(0);
+                    rivals.push(fully(first.fit));
+                }
+                _ => break,
+            }
+        }
+        let again =
+            rivals.first().filter(|first| self.affords(&first.fit)).and_then(|first| self.retuned(&base, &first.fit));
+        if let Some(again) = again {
+            let gained = again.log_evidence() - base.log_evidence();
+            rivals.iter_mut().for_each(|rival| rival.gain -= gained);
+            base = again;
+        }
+        Round { promises, rivals, before: self.heldout(&base), base, hasty }
+    }
+
+    /// What a bounce gains by its finer steps alone, which are no bounce: they suit balls.
+    fn finer_steps(&self, base: &Fit, rival: &Fit) -> f64 {
+        let Some(bounce) = rival.model.parts.last().filter(|part| part.kind() == EffectKind::Restitution) else {
+            return 0.0;
+        };
+        let mut hypothesis = base.model.hypothesis(&base.x);
+        hypothesis.effects.push(bounce.effect(&vec![0.0; bounce.coordinates.len()]));
+        let white = self.study.white(&self.study.raw(&hypothesis), base.model.engine_errors(&base.x));
+        (base.cost() - cost(&base.x, &white)).max(0.0)
+    }
+
+    /// The model without the last effect of `rival` where re-tuning can do the same, fitted from there, if that is better than `base`: no effect may be
+    /// named because re-tuning had not gone far enough.
+    fn retuned(&self, base: &Fit, rival: &Fit) -> Option<Fit> {
+        let part = rival.model.parts.last()?;
+        let coordinates = &rival.x[rival.x.len() - part.coordinates.len()..];
+        let tunables = &self.study.simulator.nominal.tunables;
+        let place = |key: &str| tunables.iter().position(|tunable| tunable.key == key);
+        let value = |place: usize| tunables[place].value(rival.x[place]);
+        let (place, value) = match part.effect(coordinates) {
+            EffectConfig::FrictionLevel(level) => (place("table.friction")?, level.coefficient),
+            // Forces at all speeds and weights are in proportion to the mass.
+            EffectConfig::ForceGain(gain) => place("object.mass_kg").map(|place| (place, value(place) * gain.gain))?,
+            _ => return None,
+        };
+        let mut x = rival.x[..base.x.len()].to_vec();
+        let [low, high] = base.model.range(place);
+        x[place] = tunables[place].coordinate(value).clamp(low, high);
+        let raw = self.study.raw(&base.model.hypothesis(&x));
+        if cost(&x, &self.study.white(&raw, base.model.engine_errors(&x))) > base.cost() {
+            return None;
+        }
+        let begin = Begin { x, raw: Some(raw), jacobian: Vec::new() };
+        let again = fit(&self.study, base.model.clone(), begin, Effort::Quick);
+        (again.log_evidence() > base.log_evidence()).then_some(again)
+    }
+
+    /// Fits what promises most to the episodes of the screening; the best first.
+    fn quick(&self, screening: &Screening, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
+        let places = &screening.places;
+        let part = self.study.part(places);
+        let base = base.part(places);
+        let count = if base.model.parts.is_empty() { self.settings.quick_fits } else { self.settings.fits };
+        let before = base.log_evidence();
+        let share = self.study.groups().len() as f64 / part.groups().len() as f64;
+        let (mut quick, mut gained) = (Vec::<Fit>::new(), 0.0_f64);
+        for promise in shortlist(promises, count) {
+            if quick.len() >= LEAST_FITS && promise.gain < HOPELESS * share * gained {
+                continue;
+            }
+            let model = base.model.with(&promise.candidate);
+            let begin = begin(&part, &base, &model, &promise);
+            let fit = fit(&part, model, begin, Effort::Quick);
+            gained = gained.max(fit.log_evidence() - before);
+            quick.push(fit);
+        }
+        let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
+        sort(&mut quick);
+        // Half or one and a half times as strong an effect may lie beyond a ridge that no descent crosses.
+        if let Some(best) = quick.first_mut() {
+            shake(&part, best);
+        }
+        // Twins (a tilt and a force) reach the same optimum or neither: one that was found is where the other begins.
+        if let Some(best) = quick.first().cloned() {
+            quick.iter_mut().skip(1).for_each(|other| follow(&part, &best, other));
+            sort(&mut quick);
+        }
+        // Of one kind's several places the best.
+        let mut kinds = Vec::new();
+        quick.retain(|fit| {
+            let kind = fit.model.parts.last().map(Candidate::kind);
+            let first = !kinds.contains(&kind);
+            kinds.push(kind);
+            first
+        });
+        quick
+    }
+}
+
+/// Whether a fit leaves more than noise in most episodes.
+fn leaves_much(fit: &Fit, study: &Study, settings: &Settings) -> bool {
+    trimmed_mean(study.groups().into_iter().map(|group| mean_square(&fit.residuals[group])).collect())
+        > settings.unexplained
+}
