@@ -10,6 +10,7 @@ use crate::diagnosis::Settings;
 use crate::fit::{Begin, Effort, Fit, STEPS, cost, fit};
 use crate::likelihood::{mean_square, trimmed_mean};
 use crate::locate::{Cell, locate};
+use crate::model::Model;
 use crate::rival::{Rival, Round, sort};
 use crate::screen::{Promise, Screening, shortlist};
 use crate::study::Study;
@@ -103,7 +104,7 @@ impl Search<'_> {
         let without = round.base.log_evidence();
         let lead = round.rivals.first().map_or(0.0, |first| first.gain);
         for rival in round.rivals.iter_mut().filter(|rival| lead - rival.gain < NEAR) {
-            if self.affords(&rival.fit) {
+            if self.affords(&self.study, &rival.fit.model) {
                 let fit = fit(&self.study, rival.fit.model.clone(), Begin::at(&rival.fit.x), Effort::Full);
                 rival.gain = fit.log_evidence() - without - self.finer_steps(&round.base, &fit);
                 (rival.heldout, rival.fit) = (self.heldout(&fit), fit);
@@ -114,46 +115,41 @@ impl Search<'_> {
 
     /// The model of two effects, or a better one with a rival of the first in its place: which of those it was is plainer beside the second.
     fn exchange(&self, screening: &Screening, first: &mut Round, accepted: Fit) -> Fit {
-        let part = self.study.part(&screening.places);
         let [_, second] = accepted.model.parts.as_slice() else { return accepted };
         let own = &accepted.x[accepted.x.len() - second.coordinates.len()..];
-        let beside = |rival: &Rival| -> Fit {
+        let part = self.study.part(&screening.places);
+        let beside = |rival: &Rival| -> Option<Fit> {
             let x = [&rival.fit.x, own].concat();
-            fit(&part, rival.fit.model.with(second), Begin::at(&x), Effort::Quick)
+            let model = rival.fit.model.with(second);
+            (self.affords(&part, &model)).then(|| fit(&part, model, Begin::at(&x), Effort::Quick))
         };
+        let Some((lead, others)) = first.rivals.split_first_mut() else { return accepted };
+        let (gain, Some(as_found)) = (lead.gain, beside(lead)) else { return accepted };
         let share = self.study.groups().len() as f64 / part.groups().len() as f64;
-        let mut best: Option<(usize, Fit)> = None;
-        let lead = first.rivals.first().map(|rival| (rival.gain, beside(rival).log_evidence()));
-        let Some((gain, evidence)) = lead else { return accepted };
-        for (index, rival) in first.rivals.iter_mut().enumerate().skip(1) {
-            let within = self.study.simulator.rollouts() <= self.settings.rollouts;
-            if !within || rival.kind() == second.kind() {
-                continue;
-            }
-            let pair = beside(rival);
-            rival.gain = gain + share * (pair.log_evidence() - evidence);
-            if rival.gain > gain && best.as_ref().is_none_or(|(_, best)| pair.log_evidence() > best.log_evidence()) {
-                best = Some((index, pair));
+        let mut best: Option<Fit> = None;
+        for rival in others.iter_mut().filter(|rival| rival.kind() != second.kind()) {
+            let Some(pair) = beside(rival) else { break };
+            let evidence = pair.log_evidence();
+            rival.gain = gain + share * (evidence - as_found.log_evidence());
+            if rival.gain > gain && best.as_ref().is_none_or(|best| evidence > best.log_evidence()) {
+                best = Some(pair);
             }
         }
-        let Some((index, pair)) = best.filter(|(_, pair)| self.affords(pair)) else {
-            sort(&mut first.rivals);
-            return accepted;
-        };
-        let found = fit(&self.study, pair.model, Begin::at(&pair.x), Effort::Quick);
-        if found.log_evidence() <= accepted.log_evidence() {
-            first.rivals[index].gain = gain;
-            sort(&mut first.rivals);
-            return accepted;
+        let found = best
+            .filter(|pair| self.affords(&self.study, &pair.model))
+            .map(|pair| fit(&self.study, pair.model, Begin::at(&pair.x), Effort::Quick));
+        let found = found.filter(|found| found.log_evidence() > accepted.log_evidence());
+        if found.is_none() {
+            others.iter_mut().for_each(|rival| rival.gain = rival.gain.min(gain));
         }
         sort(&mut first.rivals);
-        found
+        found.unwrap_or(accepted)
     }
 
-    /// Whether a fit of this model to all episodes is within the budget.
-    fn affords(&self, fit: &Fit) -> bool {
-        let simulated = fit.x.len() - fit.model.errors;
-        self.study.simulator.affords((simulated + STEPS + 1) * self.study.groups().len())
+    /// Whether a quick fit of a model to the episodes of a study is within the budget.
+    fn affords(&self, study: &Study, model: &Model) -> bool {
+        let simulated = model.count() - model.errors;
+        self.study.simulator.affords((simulated + STEPS + 1) * study.groups().len())
     }
 
     /// What a model leaves, by channel and phase.
@@ -194,7 +190,7 @@ impl Search<'_> {
             && quick.first().is_some_and(|best| leaves_much(best, &self.study.part(&screening.places), self.settings));
         let effort = if hasty { Effort::Quick } else { Effort::Full };
         let fully = |quick: Fit| -> Rival {
-            if !self.affords(&quick) {
+            if !self.affords(&self.study, &quick.model) {
                 return Rival {
                     heldout: self.heldout(&quick),
                     gain: share * (quick.log_evidence() - before),
@@ -229,15 +225,20 @@ impl Search<'_> {
             sort(&mut rivals);
             // Unless those before do not keep what they promise.
             match rivals.first() {
-                Some(first) if first.fit.residuals.len() < self.study.chosen.len() && self.affords(&first.fit) => {
+                Some(first)
+                    if first.fit.residuals.len() < self.study.chosen.len()
+                        && self.affords(&self.study, &first.fit.model) =>
+                {
                     let first = rivals.swap_remove(0);
                     rivals.push(fully(first.fit));
                 }
                 _ => break,
             }
         }
-        let again =
-            rivals.first().filter(|first| self.affords(&first.fit)).and_then(|first| self.retuned(&base, &first.fit));
+        let again = rivals
+            .first()
+            .filter(|first| self.affords(&self.study, &first.fit.model))
+            .and_then(|first| self.retuned(&base, &first.fit));
         if let Some(again) = again {
             let gained = again.log_evidence() - base.log_evidence();
             rivals.iter_mut().for_each(|rival| rival.gain -= gained);
