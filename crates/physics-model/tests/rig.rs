@@ -123,9 +123,9 @@ fn a_steady_push_takes_mu_m_g_with_what_is_added() {
 
 #[test]
 fn the_pair_of_tool_and_object_has_its_own_friction() {
-    // The ball rises along the face that it pushes.
-    let vertical = |friction| {
-        let mut rig = ball();
+    // The ball rises along the face that it pushes, at 3 cm/s.
+    let vertical = |friction, tool_slip_mps| {
+        let mut rig = Rig { tool_slip_mps, ..ball() };
         rig.world.tool_friction = friction;
         let object = RigObject { friction: 0.1, ..cuboid() };
         let commands: Vec<[f64; 3]> =
@@ -135,8 +135,21 @@ fn the_pair_of_tool_and_object_has_its_own_friction() {
         let sums = readings[30..].iter().fold([0.0; 2], |[x, z], r| [x + r.wrench.force_n[0], z + r.wrench.force_n[2]]);
         sums[1] / sums[0]
     };
-    close(vertical(0.3), 0.3, 0.02);
-    close(vertical(0.05), 0.05, 0.01);
+    close(vertical(0.3, 0.0), 0.3, 0.02);
+    close(vertical(0.05, 0.0), 0.05, 0.01);
+    // One that lets go has all of it from a slip on, and half of it at half of that.
+    close(vertical(0.3, 0.01), 0.3, 0.02);
+    close(vertical(0.3, 0.06), 0.15, 0.02);
+}
+
+#[test]
+fn a_slip_that_is_none_is_refused() {
+    for tool_slip_mps in [-0.001, 2.0, f64::NAN] {
+        let rig = Rig { tool_slip_mps, ..ball() };
+        let (tool_m, commands) = push(3);
+        let result = rig.run(&cuboid(), &[], &RigStart::of_episode(standing(), Some(tool_m)), &commands);
+        assert!(result.unwrap_err().to_string().contains("tool_slip_mps"));
+    }
 }
 
 #[test]

@@ -65,6 +65,9 @@ impl Rig {
         if !(self.world.control_period_secs > 0.0 && self.world.control_period_secs <= 1.0) {
             return refuse("control_period_secs", "more than 0, up to 1 s");
         }
+        if !(0.0..=1.0).contains(&self.tool_slip_mps) {
+            return refuse("tool_slip_mps", "0 to 1 m/s");
+        }
         if let RigTool::Ball { radius_m } = self.tool
             && !(1e-4..=10.0).contains(&radius_m)
         {
