@@ -181,8 +181,8 @@ struct Push {
     creeps: bool,
 }
 
-/// To the object and a little on, a stop, and on slower than what sticks lets go at. Who creeps towards an object instead measures where it begins to
-/// a tenth of a millisecond's way: there the smallest error of a pose is as good as any friction.
+/// To the object and a little on, a stop, and on slower than what sticks lets go at. Who creeps towards an object instead
+/// measures where it begins to a tenth of a millimetre: there the smallest error of a pose explains as much as any friction.
 fn creep(scene: &Scene, path: &mut Path, at: impl Fn(f64) -> [f64; 3]) {
     path.go(at(-scene.face_m + 0.008), 0.03, 0.1);
     path.wait(0.2);
@@ -247,7 +247,7 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
         scripts.push(Script { place_m, lift_m: 0.0, yaw_rad: 0.0, added_mass_kg: 0.0, commands: path.points });
     }
     for index in 0..2 {
-        // A creep, slower than what sticks lets go at, and a walk: what differs between them is no Stribeck friction.
+        // A creep, slower than what sticks lets go at, and a walk: what differs between them is no Stribeck friction. What rolls away is walked after.
         let place_m = [scene.centre_m[0] + 0.1 * draw(), scene.centre_m[1] + 0.1 * draw()];
         let angle = f64::from(index) * std::f64::consts::FRAC_PI_2 + 0.3 * draw();
         let (sin, cos) = angle.sin_cos();
