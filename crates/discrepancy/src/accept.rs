@@ -11,9 +11,9 @@ use crate::rival::{Rival, Round};
 
 /// Share of resamples in which a strength has to have the same sign.
 const SAME_SIGN: f64 = 0.95;
-/// A strength below this, in standard deviations of what is plausible (0.4 mm of an offset, 0.1 % of a scale), is as good as none, however surely it is
-/// not 0: what no model is right about shows in long logs.
-const NEGLIGIBLE: f64 = 0.03;
+/// A strength below this, in standard deviations of what is plausible (0.13 mm of an offset, 0.04 % of a scale, 33 g of a payload, less than the catalogue
+/// calls plausible of any), is as good as none, however surely it is not 0: what no model is right about shows in long logs.
+pub(crate) const NEGLIGIBLE: f64 = 0.01;
 /// By chance an effect that no held-out episode shows may explain them worse by this much in ln p.
 const HELDOUT_SLACK: f64 = 1.0;
 /// The same as a share of the gain: the place of an obstacle is not known exactly.
@@ -55,7 +55,7 @@ pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, asked
 
 /// Whether the last effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
 /// resamples, as wide as the intervals that are reported.
-fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
+pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
     let Some(part) = fit.model.parts.last() else { return false };
     if part.begin.is_some() {
         // A body in the way has no sign.

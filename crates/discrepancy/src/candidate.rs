@@ -16,6 +16,8 @@ const STRENGTH_SHARE: f64 = 1.0 / 1.5;
 const REACH: f64 = 0.35;
 /// The same where what a strength does is far from linear.
 const FAR: f64 = 1.2;
+/// Natural frequency of a soft contact, in that of the model's.
+const SOFT: f64 = 0.5;
 /// Places of a patch that are tried.
 const PATCHES: usize = 6;
 /// Standard deviation of where something is, m, around the place that a fit begins from.
@@ -72,7 +74,7 @@ pub struct Candidate {
     pub coordinates: Vec<Coordinate>,
     /// Coordinates that a fit starts from for what has no small version of itself (a body in the way); `None`: from 0.
     pub begin: Option<Vec<f64>>,
-    /// How far from neutral, in units, the screening measures what a strength does.
+    /// How far from neutral, in units, the screening measures what a strength does; the other way where this is beyond the range.
     pub reach: f64,
 }
 
@@ -169,9 +171,13 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         }
         EffectKind::StribeckFriction => [0.02, 0.06].iter().map(|v| with(&[(1, *v)])).collect(),
         EffectKind::HiddenObstacle => obstacles(context),
-        // What a soft contact or a bounce changes is no multiple of what a slightly softer one does.
-        EffectKind::ContactCompliance | EffectKind::Restitution => {
-            [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
+        // What a bounce or a soft contact changes is no multiple of what a slight one or a stiffer one does.
+        EffectKind::Restitution => [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect(),
+        EffectKind::ContactCompliance => {
+            let near = with(&[]);
+            let soft = with(&[(0, SOFT * neutral.values()[0])]);
+            let reach = near.coordinates_of(&soft.base.values())[0];
+            vec![Candidate { reach, ..near.clone() }, near]
         }
         _ => vec![with(&[])],
     }
@@ -307,6 +313,37 @@ mod tests {
             joints: true,
             wrist_torques: true,
             joint_torques: true,
+        }
+    }
+
+    #[test]
+    fn soft_contacts_are_looked_for_where_they_are_soft() {
+        let all = candidates(&context());
+        let of = |kind| all.iter().filter(move |candidate| candidate.kind() == kind);
+        let at_reach = |candidate: &Candidate| {
+            let a: Vec<f64> =
+                candidate.coordinates.iter().map(|c| if c.strength { candidate.reach } else { 0.0 }).collect();
+            candidate.effect(&a).values()[0]
+        };
+        let [soft, stiff] = of(EffectKind::ContactCompliance).map(at_reach).collect::<Vec<_>>()[..] else { panic!() };
+        assert!((soft - 30.0).abs() < 1e-9 && stiff > 60.0, "{soft} and {stiff} Hz, of 60");
+        let [little, much] = of(EffectKind::Restitution).map(at_reach).collect::<Vec<_>>()[..] else { panic!() };
+        assert!(little > 0.1 && little < 0.3 && much > 0.5 && much < 0.9, "{little} and {much}");
+    }
+
+    #[test]
+    fn nothing_that_the_catalogue_calls_plausible_is_negligible() {
+        for candidate in candidates(&context()) {
+            let parameters = candidate.kind().parameters();
+            for index in candidate.strengths() {
+                let coordinate = &candidate.coordinates[index];
+                let parameter = &parameters[coordinate.index];
+                let least = parameter
+                    .plausible
+                    .map(|end| ((parameter.scale.coordinate(end) - coordinate.origin) / coordinate.unit).abs());
+                let ends = least.into_iter().filter(|a| *a > 1e-9).fold(f64::INFINITY, f64::min);
+                assert!(ends > crate::accept::NEGLIGIBLE, "{}: {ends}", parameter.name);
+            }
         }
     }
 

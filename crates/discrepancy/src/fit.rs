@@ -103,7 +103,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         Effort::Quick => 1,
         Effort::Full => 3,
     };
-    let groups = study.groups().len();
+    let simulation = study.rollouts();
     let mut before = f64::INFINITY;
     for round in 0..rounds {
         let now = cost(&x, &residuals);
@@ -117,7 +117,8 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         let mut damping = 1e-3;
         let mut moved = false;
         for _ in 0..STEPS {
-            if !study.simulator.affords(groups) {
+            // What everything else is compared with is fitted whatever it costs.
+            if !model.parts.is_empty() && !study.simulator.affords(simulation) {
                 break;
             }
             let Some(step) = step(&model, &x, &residuals, &jacobian, damping) else { break };
@@ -142,7 +143,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             return Fit { model, x, raw, residuals, jacobian };
         }
     }
-    if effort == Effort::Full && study.simulator.affords(x.len() * groups) {
+    if effort == Effort::Full && study.simulator.affords(model.simulated() * simulation) {
         jacobian = derivatives(study, &model, &x, (&raw, &residuals));
     }
     Fit { model, x, raw, residuals, jacobian }

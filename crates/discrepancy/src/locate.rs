@@ -154,7 +154,9 @@ impl Tossed {
         let n = self.excess.len() as f64;
         let mean = self.excess.iter().map(|(episode, e)| if negative[*episode] { -e } else { *e }).sum::<f64>() / n;
         let variance = (self.square - mean * mean).max(1e-12) / (n - 1.0);
-        law.sf(mean / variance.sqrt()).max((-n).exp2())
+        let t = mean / variance.sqrt();
+        // Residuals of a simulation that went astray need not be finite.
+        if t.is_finite() { law.sf(t).max((-n).exp2()) } else { 1.0 }
     }
 }
 
@@ -168,7 +170,7 @@ mod tests {
     fn of_few_episodes_every_way_to_flip_them_counts() {
         let all = [1.0, 1.1, 0.9, 1.2, 0.8].map(Some).to_vec();
         // No other of the 32 ways is as good.
-        assert_eq!(chances(&[all.clone()], 5, 1), [1.0 / 32.0]);
+        assert_eq!(chances(std::slice::from_ref(&all), 5, 1), [1.0 / 32.0]);
         // What says the same again says no more; what was read in three episodes alone says nothing.
         let three = [Some(9.0), Some(9.0), Some(9.0), None, None].to_vec();
         assert_eq!(chances(&[all.clone(), all.clone(), three], 5, 1)[..2], [1.0 / 32.0; 2]);
@@ -179,7 +181,7 @@ mod tests {
 
     #[test]
     fn where_nothing_is_wrong_one_log_in_twenty_has_a_chance_below_a_twentieth() {
-        let mut rng = Seed(7).stream(Purpose::Noise, 0);
+        let mut rng = Seed(7).stream(Purpose::World, 0);
         let (logs, episodes) = (400, 24);
         let mut low = 0;
         for log in 0..logs {
@@ -189,7 +191,7 @@ mod tests {
                 .map(|cell| {
                     let one = |episode: usize| -> Option<f64> {
                         let own: f64 = StandardNormal.sample(&mut rng);
-                        (episode % (cell + 1) == 0).then_some(odd[episode] + own)
+                        episode.is_multiple_of(cell + 1).then_some(odd[episode] + own)
                     };
                     (0..episodes).map(one).collect()
                 })

@@ -43,6 +43,12 @@ impl Model {
         self.tunables + self.errors + self.parts.iter().map(|part| part.coordinates.len()).sum::<usize>()
     }
 
+    /// Number of those of which a simulation depends.
+    #[must_use]
+    pub fn simulated(&self) -> usize {
+        self.count() - self.errors
+    }
+
     /// Range of a coordinate.
     #[must_use]
     pub fn range(&self, index: usize) -> [f64; 2] {

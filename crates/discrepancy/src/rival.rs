@@ -10,7 +10,7 @@ use crate::screen::Promise;
 pub struct Rival {
     /// Its fit; the further effect is the last of the model's parts.
     pub fit: Fit,
-    /// ln evidence over that of the model without.
+    /// ln evidence over that of the model without; of what was fitted to the episodes of the screening alone what that promises for all.
     pub gain: f64,
     /// Sums of squares of the held-out episodes.
     pub heldout: Vec<f64>,

@@ -124,7 +124,8 @@ impl Screening {
 
 /// The change of a strength that is simulated.
 fn reach(candidate: &Candidate, index: usize) -> f64 {
-    if candidate.coordinates[index].range[1] >= candidate.reach { candidate.reach } else { -candidate.reach }
+    let [low, high] = candidate.coordinates[index].range;
+    if (low..=high).contains(&candidate.reach) { candidate.reach } else { -candidate.reach }
 }
 
 /// The best of each kind, as many kinds as asked for; of what is tied to a place, or far from linear, two: a fit does not find the way from afar.
@@ -147,7 +148,7 @@ pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
 }
 
 /// Pieces of the episodes to look at, which are evenly spread over those sorted by how badly the nominal model fails them. Of those that last much longer
-/// than most one is enough: each costs as much as several others.
+/// than most only the worst may be among them: each costs as much as several others.
 fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
     let groups = study.groups();
     let failure =

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use physics_model::{EffectConfig, EffectKind};
 
-use crate::accept::{Asked, Episodes, convinces};
+use crate::accept::{Asked, Episodes, convinces, lasts};
 use crate::begin::{begin, follow, shake};
 use crate::candidate::Candidate;
 use crate::diagnosis::Settings;
@@ -21,8 +21,10 @@ const SECOND_SHARE: f64 = 0.01;
 const NEAR: f64 = 60.0;
 /// What promises less than this share of what another one gains is not fitted...
 const HOPELESS: f64 = 0.1;
-/// ... but for the first two.
-const LEAST_FITS: usize = 2;
+/// ... but for the first two kinds.
+const LEAST_KINDS: usize = 2;
+/// What keeps this share of what it promised in the episodes of the screening says what others would keep.
+const MOST_KEEP: f64 = 0.5;
 /// A null that leaves more than this share of the best effect's gain unexplained was no place to learn errors at.
 const FAR: f64 = 100.0;
 
@@ -55,7 +57,11 @@ impl Search<'_> {
         let (mut accepted, mut rounds, mut explained, mut remaining) = (null.clone(), Vec::new(), 0.0, None);
         while accepted.model.parts.len() < settings.effects && self.study.simulator.rollouts() <= settings.rollouts {
             let mut round = self.round(screening, &accepted);
-            let found = self.choose(&mut round, episodes, explained);
+            let mut found = self.choose(&mut round, episodes, explained);
+            if !found && round.hasty {
+                self.compare(screening, &mut round);
+                found = self.choose(&mut round, episodes, explained);
+            }
             // Without another effect the same model, fitted with more care on the way.
             accepted = round.best(found).clone();
             explained += round.rivals.first().map_or(0.0, |best| best.gain);
@@ -64,8 +70,9 @@ impl Search<'_> {
                 remaining = None;
                 break;
             }
-            if let [first, _] = rounds.as_mut_slice() {
-                accepted = self.exchange(screening, first, accepted);
+            if let [first, second] = rounds.as_mut_slice() {
+                self.exchange(screening, [first, second], episodes);
+                accepted = second.best(true).clone();
             }
             let cells = self.left(&accepted);
             let another = self.stands_out(&cells);
@@ -79,7 +86,7 @@ impl Search<'_> {
             && accepted.model.parts.len() == 1
             && first.hasty
         {
-            self.compare(first);
+            self.compare(screening, first);
             let found = self.choose(first, episodes, 0.0);
             accepted = first.best(found).clone();
             remaining = None;
@@ -100,56 +107,78 @@ impl Search<'_> {
     }
 
     /// Fits with care what was fitted in haste and what is near it.
-    fn compare(&self, round: &mut Round) {
+    fn compare(&self, screening: &Screening, round: &mut Round) {
         let without = round.base.log_evidence();
+        let near = NEAR * self.share(screening);
         let lead = round.rivals.first().map_or(0.0, |first| first.gain);
-        for rival in round.rivals.iter_mut().filter(|rival| lead - rival.gain < NEAR) {
-            if self.affords(&self.study, &rival.fit.model) {
+        let mut change = None;
+        for rival in &mut round.rivals {
+            if lead - rival.gain < near && self.affords(&self.study, &rival.fit.model) {
                 let fit = fit(&self.study, rival.fit.model.clone(), Begin::at(&rival.fit.x), Effort::Full);
-                rival.gain = fit.log_evidence() - without - self.finer_steps(&round.base, &fit);
-                (rival.heldout, rival.fit) = (self.heldout(&fit), fit);
+                let gain = fit.log_evidence() - without - self.finer_steps(&round.base, &fit);
+                change.get_or_insert(gain - rival.gain);
+                *rival = Rival { heldout: self.heldout(&fit), gain, fit };
+            } else {
+                // What care brings the first it might bring the others.
+                rival.gain += change.unwrap_or(0.0);
             }
         }
+        round.hasty = false;
         sort(&mut round.rivals);
     }
 
-    /// The model of two effects, or a better one with a rival of the first in its place: which of those it was is plainer beside the second.
-    fn exchange(&self, screening: &Screening, first: &mut Round, accepted: Fit) -> Fit {
-        let [_, second] = accepted.model.parts.as_slice() else { return accepted };
-        let own = &accepted.x[accepted.x.len() - second.coordinates.len()..];
+    /// Puts a rival of the first effect in its place where that does better beside the second: which of those it was is plainer there.
+    fn exchange(&self, screening: &Screening, [first, second]: [&mut Round; 2], episodes: &Episodes) {
+        let Some((pair, _)) = second.rivals.split_first_mut() else { return };
+        let Some(added) = pair.fit.model.parts.last().cloned() else { return };
+        let own = pair.fit.x[pair.fit.x.len() - added.coordinates.len()..].to_vec();
         let part = self.study.part(&screening.places);
         let beside = |rival: &Rival| -> Option<Fit> {
-            let x = [&rival.fit.x, own].concat();
-            let model = rival.fit.model.with(second);
-            (self.affords(&part, &model)).then(|| fit(&part, model, Begin::at(&x), Effort::Quick))
+            let x = [rival.fit.x.as_slice(), &own].concat();
+            let model = rival.fit.model.with(&added);
+            self.affords(&part, &model).then(|| fit(&part, model, Begin::at(&x), Effort::Quick))
         };
-        let Some((lead, others)) = first.rivals.split_first_mut() else { return accepted };
-        let (gain, Some(as_found)) = (lead.gain, beside(lead)) else { return accepted };
-        let share = self.study.groups().len() as f64 / part.groups().len() as f64;
-        let mut best: Option<Fit> = None;
-        for rival in others.iter_mut().filter(|rival| rival.kind() != second.kind()) {
-            let Some(pair) = beside(rival) else { break };
-            let evidence = pair.log_evidence();
-            rival.gain = gain + share * (evidence - as_found.log_evidence());
-            if rival.gain > gain && best.as_ref().is_none_or(|best| evidence > best.log_evidence()) {
-                best = Some(pair);
+        let Some((lead, others)) = first.rivals.split_first_mut() else { return };
+        let Some(as_found) = beside(lead) else { return };
+        let mut best: Option<(usize, Fit)> = None;
+        for (index, rival) in others.iter_mut().enumerate().filter(|(_, rival)| rival.kind() != added.kind()) {
+            let Some(fit) = beside(rival) else { break };
+            let more = fit.log_evidence() - as_found.log_evidence();
+            rival.gain = lead.gain + self.share(screening) * more;
+            if more > 0.0 && best.as_ref().is_none_or(|(_, best)| fit.log_evidence() > best.log_evidence()) {
+                best = Some((index, fit));
             }
         }
-        let found = best
-            .filter(|pair| self.affords(&self.study, &pair.model))
-            .map(|pair| fit(&self.study, pair.model, Begin::at(&pair.x), Effort::Quick));
-        let found = found.filter(|found| found.log_evidence() > accepted.log_evidence());
-        if found.is_none() {
-            others.iter_mut().for_each(|rival| rival.gain = rival.gain.min(gain));
+        let best = best.filter(|(_, fit)| self.affords(&self.study, &fit.model));
+        if let Some((index, begin)) = best {
+            let fit = fit(&self.study, begin.model, Begin::at(&begin.x), Effort::Full);
+            let heldout = self.heldout(&fit);
+            // In all episodes, as far as those of the screening do not say.
+            let more = fit.log_evidence() - pair.fit.log_evidence();
+            others[index].gain = lead.gain + more;
+            if more > 0.0
+                && heldout.iter().sum::<f64>() < pair.heldout.iter().sum()
+                && lasts(&fit, &episodes.fitted, self.settings.seed)
+            {
+                *pair = Rival { heldout, gain: pair.gain, fit };
+                sort(&mut first.rivals);
+                return;
+            }
         }
+        // No rival that was not better in all episodes comes before what is kept.
+        let most = lead.gain;
+        others.iter_mut().for_each(|rival| rival.gain = rival.gain.min(most));
         sort(&mut first.rivals);
-        found.unwrap_or(accepted)
+    }
+
+    /// How many times as much all episodes say as those of the screening.
+    fn share(&self, screening: &Screening) -> f64 {
+        self.study.chosen.len() as f64 / screening.places.len() as f64
     }
 
     /// Whether a quick fit of a model to the episodes of a study is within the budget.
     fn affords(&self, study: &Study, model: &Model) -> bool {
-        let simulated = model.count() - model.errors;
-        self.study.simulator.affords((simulated + STEPS + 1) * study.groups().len())
+        self.study.simulator.affords((model.simulated() + STEPS + 1) * study.rollouts())
     }
 
     /// What a model leaves, by channel and phase.
@@ -184,7 +213,7 @@ impl Search<'_> {
         quick.truncate(fits);
         let lead = quick.first().map_or(0.0, Fit::log_evidence);
         let without = base.log_evidence();
-        let share = base.residuals.len() as f64 / screening.places.len() as f64;
+        let share = self.share(screening);
         // Where the best alone leaves much of the episodes of the screening, a second effect is the question, not by how much the first one leads.
         let hasty = base.model.parts.is_empty()
             && quick.first().is_some_and(|best| leaves_much(best, &self.study.part(&screening.places), self.settings));
@@ -217,9 +246,12 @@ impl Search<'_> {
             })
             .collect();
         if hasty && let [first, others @ ..] = rivals.as_mut_slice() {
-            // What the others gain in the episodes of the screening is not what a fit to all does, but by how much less than the first it is.
-            let promised = share * (lead - before);
-            others.iter_mut().for_each(|other| other.gain += first.gain - promised);
+            // What the others gain in the episodes of the screening is not what a fit to all does, but by how much less than the first it is: unless that
+            // keeps too little of what it promised to say so.
+            let (kept, promised) = (first.fit.log_evidence() - without, share * (lead - before));
+            if kept > MOST_KEEP * promised {
+                others.iter_mut().for_each(|other| other.gain += kept - promised);
+            }
         }
         loop {
             sort(&mut rivals);
@@ -291,13 +323,17 @@ impl Search<'_> {
         let base = base.part(places);
         let count = if base.model.parts.is_empty() { self.settings.quick_fits } else { self.settings.fits };
         let before = base.log_evidence();
-        let share = self.study.groups().len() as f64 / part.groups().len() as f64;
-        let (mut quick, mut gained) = (Vec::<Fit>::new(), 0.0_f64);
+        let share = self.share(screening);
+        let (mut quick, mut gained, mut kinds) = (Vec::<Fit>::new(), 0.0_f64, Vec::new());
         for promise in shortlist(promises, count) {
-            if quick.len() >= LEAST_FITS && promise.gain < HOPELESS * share * gained {
+            let (kind, model) = (promise.candidate.kind(), base.model.with(&promise.candidate));
+            let hopeless = kinds.len() >= LEAST_KINDS && promise.gain < HOPELESS * share * gained;
+            if (hopeless && !kinds.contains(&kind)) || !self.affords(&part, &model) {
                 continue;
             }
-            let model = base.model.with(&promise.candidate);
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
             let begin = begin(&part, &base, &model, &promise);
             let fit = fit(&part, model, begin, Effort::Quick);
             gained = gained.max(fit.log_evidence() - before);
@@ -306,12 +342,13 @@ impl Search<'_> {
         let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
         sort(&mut quick);
         // Half or one and a half times as strong an effect may lie beyond a ridge that no descent crosses.
-        if let Some(best) = quick.first_mut() {
+        let within = |fit: &Fit| self.affords(&part, &fit.model);
+        if let Some(best) = quick.first_mut().filter(|best| within(best)) {
             shake(&part, best);
         }
         // Twins (a tilt and a force) reach the same optimum or neither: one that was found is where the other begins.
         if let Some(best) = quick.first().cloned() {
-            quick.iter_mut().skip(1).for_each(|other| follow(&part, &best, other));
+            quick.iter_mut().skip(1).filter(|other| within(other)).for_each(|other| follow(&part, &best, other));
             sort(&mut quick);
         }
         // Of one kind's several places the best.

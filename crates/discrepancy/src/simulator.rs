@@ -42,7 +42,7 @@ pub struct Simulator<'a> {
     /// The episodes.
     pub trials: &'a [Trial],
     ticks: AtomicUsize,
-    /// Simulated episodes after which fits end where they are, and which are never exceeded by one.
+    /// Simulated episodes after which fits end where they are, and which none of their simulations exceeds.
     budget: [usize; 2],
 }
 
@@ -74,9 +74,18 @@ impl<'a> Simulator<'a> {
     /// Simulated time so far, in mean durations of an episode.
     #[must_use]
     pub fn rollouts(&self) -> usize {
+        self.in_episodes(self.ticks.load(Ordering::Relaxed))
+    }
+
+    /// What a simulation of the episodes `chosen` costs of these.
+    #[must_use]
+    pub fn cost(&self, chosen: &[usize]) -> usize {
+        self.in_episodes(chosen.iter().map(|index| self.trials[*index].ticks).sum()) + 1
+    }
+
+    fn in_episodes(&self, ticks: usize) -> usize {
         let all: usize = self.trials.iter().map(|trial| trial.ticks).sum();
-        let episodes = groups(self.trials.iter()).len();
-        self.ticks.load(Ordering::Relaxed) * episodes / all.max(1)
+        ticks * groups(self.trials.iter()).len() / all.max(1)
     }
 
     /// Residuals of the episodes `chosen` (see [`Trial::residuals`]), in parallel; the order is that of `chosen`.

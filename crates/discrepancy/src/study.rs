@@ -33,17 +33,21 @@ const STIFFER: f64 = 1.5;
 /// the first touch left for good, another relaxes it.
 const LETS_GO_MPS: f64 = 0.002;
 
-/// Settings under which a right model's answers should not differ, with the standard deviation of the error in such differences.
-fn variants(engine: &Engine) -> [(Engine, f64); 7] {
-    [
+/// Settings under which a right model's answers should not differ, with the standard deviation of the error in such differences. What is thrown has no
+/// tool and no sole.
+fn variants(engine: &Engine, has_tool: bool) -> Vec<(Engine, f64)> {
+    let mut variants = vec![
         (Engine { refinement: 2 * engine.refinement, ..*engine }, ERROR_SCALE),
         (Engine { refinement: 3 * engine.refinement, solver_iterations: 2, ..*engine }, ERROR_SCALE),
         (Engine { solver_iterations: 2 * engine.solver_iterations, ..*engine }, ERROR_SCALE),
         (Engine { contact_frequency_hz: STIFFER * engine.contact_frequency_hz, ..*engine }, 1.0),
         (Engine { contact_damping_ratio: engine.contact_damping_ratio / STIFFER, ..*engine }, 1.0),
-        (Engine { on_points: !engine.on_points, ..*engine }, ERROR_SCALE),
-        (Engine { tool_slip_mps: LETS_GO_MPS, ..*engine }, ERROR_SCALE),
-    ]
+    ];
+    if has_tool {
+        variants.push((Engine { on_points: !engine.on_points, ..*engine }, ERROR_SCALE));
+        variants.push((Engine { tool_slip_mps: LETS_GO_MPS, ..*engine }, ERROR_SCALE));
+    }
+    variants
 }
 
 impl<'a> Study<'a> {
@@ -105,8 +109,9 @@ impl<'a> Study<'a> {
             };
             changed.iter().zip(&plain).map(less).collect()
         };
-        let engine_errors: Vec<Stack> =
-            (variants(&self.engine).iter()).map(|(engine, scale)| change(engine, Nudge::default(), *scale)).collect();
+        let engine_errors: Vec<Stack> = (variants(&self.engine, self.simulator.nominal.has_tool()).iter())
+            .map(|(engine, scale)| change(engine, Nudge::default(), *scale))
+            .collect();
         let mut nudges: Vec<Nudge> = Vec::new();
         let unit = |index: usize| std::array::from_fn(|i| if i == index { 1.0 } else { 0.0 });
         nudges.extend((0..3).map(|index| Nudge { pose: unit(index), ..Nudge::default() }));
@@ -124,6 +129,12 @@ impl<'a> Study<'a> {
             (0..self.chosen.len()).map(|place| Whitener::new(plain[place].len(), &columns(place))).collect();
         // The start is another in each episode; the engine is the same in all, whatever else its errors do to a single one.
         self.engine_errors = engine_errors;
+    }
+
+    /// What a simulation of all its episodes costs, see [`Simulator::rollouts`].
+    #[must_use]
+    pub fn rollouts(&self) -> usize {
+        self.simulator.cost(&self.chosen)
     }
 
     /// Places of the pieces of each episode.
