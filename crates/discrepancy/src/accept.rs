@@ -53,6 +53,20 @@ pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, asked
         && lasts(&rival.fit, &episodes.fitted, seed)
 }
 
+/// Whether a rival might convince beside a second effect that is missing: what that one does may well hit what was held out harder.
+pub(crate) fn may_convince(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked, seed: u64) -> bool {
+    rival.fit.residuals.len() == round.base.residuals.len()
+        && rival.gain > asked.least
+        && lasts(&rival.fit, &episodes.fitted, seed)
+}
+
+/// Whether both effects of `second` convince together, beside the model that the first one was added to.
+pub(crate) fn both_convince([first, second]: [&Round; 2], episodes: &Episodes, asked: Asked) -> bool {
+    let Some(pair) = second.rivals.first() else { return false };
+    let gain = pair.fit.log_evidence() - first.base.log_evidence();
+    agrees(&Rival { gain, ..pair.clone() }, first, episodes, asked)
+}
+
 /// Whether the last effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
 /// resamples, as wide as the intervals that are reported.
 pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {

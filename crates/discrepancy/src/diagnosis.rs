@@ -16,7 +16,7 @@ use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Nominal, Tunable};
 use crate::rival::Round;
-use crate::screen::Screening;
+use crate::screen::{Screening, places};
 use crate::search::Search;
 use crate::simulator::Simulator;
 use crate::study::Study;
@@ -126,23 +126,22 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let (trials, [fitted, heldout]) = trials(log, name, nominal, &noise, settings.seed)?;
     let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]);
     let engine = nominal.engine();
-    let mut search = Search {
-        study: Study::new(&simulator, engine, fitted),
-        kept: Study::new(&simulator, engine, heldout),
-        settings,
-    };
-
-    // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search, with care where
-    // nothing explains much more.
+    // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search to all episodes, with care
+    // where nothing explains much more.
+    let study = Study::new(&simulator, engine, fitted);
     let tunables = nominal.tunables.len();
-    let first = fit(&search.study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
-    search.study.learn_errors(&first.model.hypothesis(&first.x));
-    let model = Model::nominal(tunables, search.study.engine_errors());
+    let first = fit(&study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let places = places(&study, &first);
+    let mut part = study.part(&places);
+    part.learn_errors(&first.model.hypothesis(&first.x));
+    let model = Model::nominal(tunables, part.engine_errors());
     let mut x = first.x;
     x.resize(model.count(), 0.0);
-    let null = fit(&search.study, model, Begin::at(&x), Effort::Quick);
+    let null = fit(&part, model, Begin::at(&x), Effort::Quick);
     let context = context(&simulator, &null, log, &noise);
-    let screening = Screening::new(&search.study, &null, &candidates(&context));
+    let screening = Screening::new(&part, places, &null, &candidates(&context));
+    let kept = Study::new(&simulator, engine, heldout);
+    let mut search = Search { study, kept, part, settings };
 
     let episodes = Episodes {
         fitted: search.study.groups(),
@@ -150,7 +149,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         counts: search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect(),
     };
     let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
-    let null = rounds.first().map_or(null, |round| round.base.clone());
+    let null = rounds[0].base.clone();
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
     // Of each episode, whose pieces come one after another.
     let heldout_episodes = (episodes.heldout.iter())

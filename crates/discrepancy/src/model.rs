@@ -9,7 +9,7 @@ const TUNABLE_RANGE: f64 = 8.0;
 /// Errors of the engine reach this many standard deviations.
 const ERROR_RANGE: f64 = 4.0;
 /// Step of a finite difference.
-const STEP: f64 = 0.2;
+pub(crate) const STEP: f64 = 0.2;
 
 /// What is fitted.
 #[derive(Clone, Debug, Default)]

@@ -46,11 +46,9 @@ enum Columns {
 }
 
 impl Screening {
-    /// Simulates every candidate near the re-tuned nominal model.
+    /// Simulates every candidate near the re-tuned nominal model in the episodes of `part`, which are those at `places` of all.
     #[must_use]
-    pub fn new(study: &Study, nominal: &Fit, candidates: &[Candidate]) -> Self {
-        let places = places(study, nominal);
-        let part = study.part(&places);
+    pub fn new(part: &Study, places: Vec<usize>, nominal: &Fit, candidates: &[Candidate]) -> Self {
         let hypothesis = nominal.model.hypothesis(&nominal.x);
         let base = part.raw(&hypothesis);
         let columns = candidates
@@ -82,31 +80,31 @@ impl Screening {
         Self { places, columns }
     }
 
-    /// What each candidate would bring beside what `fit` has; the most promising first.
+    /// What each candidate would bring in so many episodes beside what `fit` has; the most promising first. `part` and `fit` know the episodes of the
+    /// screening alone.
     #[must_use]
-    pub fn promises(&self, study: &Study, fit: &Fit) -> Vec<Promise> {
-        let part = study.part(&self.places);
-        let Fit { model, x, raw, residuals, jacobian: tuning } = fit.part(&self.places);
+    pub fn promises(&self, part: &Study, fit: &Fit, episodes: usize) -> Vec<Promise> {
+        let Fit { model, x, raw, residuals, jacobian: tuning } = fit;
         let moved = |change: &Vec<Vec<f64>>| -> Stack {
             let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
-            part.white(&raw.iter().zip(change).map(sum).collect::<Vec<_>>(), model.engine_errors(&x))
+            part.white(&raw.iter().zip(change).map(sum).collect::<Vec<_>>(), model.engine_errors(x))
         };
         // What was left out says as much again.
-        let share = fit.residuals.len() as f64 / self.places.len() as f64;
+        let share = episodes as f64 / self.places.len() as f64;
         let mut promises: Vec<Promise> = (self.columns.iter())
             .map(|(candidate, columns)| {
                 let (gain, begin) = match columns {
                     Columns::Whole(change) => {
                         let begin = candidate.begin.clone().unwrap_or_default();
-                        (likelihood::cost(&residuals) - likelihood::cost(&moved(change)) - begin.len() as f64, begin)
+                        (likelihood::cost(residuals) - likelihood::cost(&moved(change)) - begin.len() as f64, begin)
                     }
                     Columns::Linear(columns) => {
                         let strengths: Vec<usize> = candidate.strengths().collect();
                         let reach = |index: &usize| reach(candidate, *index);
                         let white: Vec<Stack> = (columns.iter().zip(&strengths))
-                            .map(|(change, index)| difference(&moved(change), &residuals, reach(index)))
+                            .map(|(change, index)| difference(&moved(change), residuals, reach(index)))
                             .collect();
-                        let (gain, solution) = linear(candidate, &strengths, &x, &residuals, &tuning, &white);
+                        let (gain, solution) = linear(candidate, &strengths, x, residuals, tuning, &white);
                         let mut begin = vec![0.0; candidate.coordinates.len()];
                         for (index, a) in strengths.iter().zip(&solution) {
                             begin[*index] = *a;
@@ -114,7 +112,7 @@ impl Screening {
                         (gain, begin)
                     }
                 };
-                Promise { candidate: candidate.clone(), gain: gain * share, episodes: fit.residuals.len(), begin }
+                Promise { candidate: candidate.clone(), gain: gain * share, episodes, begin }
             })
             .collect();
         promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -149,7 +147,7 @@ pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
 
 /// Pieces of the episodes to look at, which are evenly spread over those sorted by how badly the nominal model fails them. Of those that last much longer
 /// than most only the worst may be among them: each costs as much as several others.
-fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
+pub(crate) fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
     let groups = study.groups();
     let failure =
         |group: &Range<usize>| nominal.residuals[group.clone()].iter().map(DVector::norm_squared).sum::<f64>();

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use physics_model::{EffectConfig, EffectKind};
 
-use crate::accept::{Asked, Episodes, convinces, lasts};
+use crate::accept::{Asked, Episodes, both_convince, convinces, lasts, may_convince};
 use crate::begin::{begin, follow, shake};
 use crate::candidate::Candidate;
 use crate::diagnosis::Settings;
@@ -34,6 +34,8 @@ pub(crate) struct Search<'a> {
     pub(crate) study: Study<'a>,
     /// Those held out.
     pub(crate) kept: Study<'a>,
+    /// Those of the screening, with errors learnt where re-tuning alone leads.
+    pub(crate) part: Study<'a>,
     /// What it may do.
     pub(crate) settings: &'a Settings,
 }
@@ -45,8 +47,8 @@ impl Search<'_> {
         self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
     }
 
-    /// Adds effects to the re-tuned nominal model, as long as one convinces and what it leaves stands out; the model with them, what was compared, and
-    /// what the model leaves where that is known.
+    /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out; the model
+    /// with them, what was compared, and what the model leaves where that is known.
     pub(crate) fn effects(
         &mut self,
         screening: &Screening,
@@ -55,10 +57,16 @@ impl Search<'_> {
     ) -> (Fit, Vec<Round>, Option<Vec<Cell>>) {
         let settings = self.settings;
         let (mut accepted, mut rounds, mut explained, mut remaining) = (null.clone(), Vec::new(), 0.0, None);
-        while accepted.model.parts.len() < settings.effects && self.study.simulator.rollouts() <= settings.rollouts {
+        let within = |search: &Self| search.study.simulator.rollouts() <= settings.rollouts;
+        while rounds.is_empty() || (accepted.model.parts.len() < settings.effects && within(self)) {
             let mut round = self.round(screening, &accepted);
             let mut found = self.choose(&mut round, episodes, explained);
             if !found && round.hasty {
+                if let Some(pair) = self.both(screening, &mut round, episodes) {
+                    accepted = pair.best(true).clone();
+                    rounds.extend([round, pair]);
+                    break;
+                }
                 self.compare(screening, &mut round);
                 found = self.choose(&mut round, episodes, explained);
             }
@@ -96,14 +104,35 @@ impl Search<'_> {
 
     /// Drops the rivals before the best one that convinces beside effects that gained so much, and says whether one does.
     fn choose(&self, round: &mut Round, episodes: &Episodes, explained: f64) -> bool {
-        let settings = self.settings;
-        // The errors of a solver grow with what it is asked to explain.
-        let rolls = self.study.simulator.nominal.rolls();
-        let threshold = if rolls { settings.threshold_rolling } else { settings.threshold };
-        let asked = Asked { least: threshold.max(SECOND_SHARE * explained), steady: rolls };
-        let best = round.rivals.iter().position(|rival| convinces(rival, round, episodes, asked, settings.seed));
+        let asked = self.asked(explained);
+        let best = round.rivals.iter().position(|rival| convinces(rival, round, episodes, asked, self.settings.seed));
         round.rivals.drain(..best.unwrap_or(0));
         best.is_some()
+    }
+
+    /// What is asked of an effect beside others that gained so much.
+    fn asked(&self, explained: f64) -> Asked {
+        let rolls = self.study.simulator.nominal.rolls();
+        let threshold = if rolls { self.settings.threshold_rolling } else { self.settings.threshold };
+        // The errors of a solver grow with what it is asked to explain.
+        Asked { least: threshold.max(SECOND_SHARE * explained), steady: rolls }
+    }
+
+    /// The round of a second effect beside the first rival, which does not convince alone, if both do together: the rivals before that one are dropped then.
+    fn both(&mut self, screening: &Screening, round: &mut Round, episodes: &Episodes) -> Option<Round> {
+        let (asked, seed) = (self.asked(0.0), self.settings.seed);
+        let first = round.rivals.iter().position(|rival| may_convince(rival, round, episodes, asked, seed))?;
+        if self.settings.effects < 2 || self.study.simulator.rollouts() > self.settings.rollouts {
+            return None;
+        }
+        let Rival { fit, gain, .. } = round.rivals[first].clone();
+        let mut second = self.round(screening, &fit);
+        if !self.choose(&mut second, episodes, gain) || !both_convince([round, &second], episodes, asked) {
+            return None;
+        }
+        round.rivals.drain(..first);
+        self.exchange(screening, [round, &mut second], episodes);
+        Some(second)
     }
 
     /// Fits with care what was fitted in haste and what is near it.
@@ -191,32 +220,32 @@ impl Search<'_> {
         cells.iter().any(|cell| cell.p_value < self.settings.another)
     }
 
-    /// Compares what could be added to `base`.
+    /// Compares what could be added to `base`, which in the first round knows the episodes of the screening alone.
     fn round(&mut self, screening: &Screening, base: &Fit) -> Round {
-        let promises = screening.promises(&self.study, base);
-        let mut quick = self.quick(screening, base, &promises);
-        let before = base.part(&screening.places).log_evidence();
+        let first = base.model.parts.is_empty();
+        let part = if first { self.part.clone() } else { self.study.part(&screening.places) };
+        let begin = if first { base.clone() } else { base.part(&screening.places) };
+        let promises = screening.promises(&part, &begin, self.study.chosen.len());
+        let mut quick = self.quick(screening, &part, &begin, &promises);
+        let before = begin.log_evidence();
         let mut base = base.clone();
-        if base.model.parts.is_empty() {
+        if first {
             let best = quick.first().filter(|best| best.log_evidence() - before > FAR);
             // How large errors are is learnt where the model is nearly right: with what explains most.
             let right = best.unwrap_or(&base);
             let hypothesis = right.model.hypothesis(&right.x);
-            if best.is_some() {
-                self.study.learn_errors(&hypothesis);
-            }
+            self.study.learn_errors(&hypothesis);
             self.kept.learn_errors(&hypothesis);
             let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
             base = fit(&self.study, base.model, Begin::at(&base.x), effort);
         }
-        let fits = if base.model.parts.is_empty() { self.settings.fits } else { 1 };
+        let fits = if first { self.settings.fits } else { 1 };
         quick.truncate(fits);
         let lead = quick.first().map_or(0.0, Fit::log_evidence);
         let without = base.log_evidence();
         let share = self.share(screening);
         // Where the best alone leaves much of the episodes of the screening, a second effect is the question, not by how much the first one leads.
-        let hasty = base.model.parts.is_empty()
-            && quick.first().is_some_and(|best| leaves_much(best, &self.study.part(&screening.places), self.settings));
+        let hasty = first && quick.first().is_some_and(|best| leaves_much(best, &part, self.settings));
         let effort = if hasty { Effort::Quick } else { Effort::Full };
         let fully = |quick: Fit| -> Rival {
             if !self.affords(&self.study, &quick.model) {
@@ -316,11 +345,8 @@ impl Search<'_> {
         (again.log_evidence() > base.log_evidence()).then_some(again)
     }
 
-    /// Fits what promises most to the episodes of the screening; the best first.
-    fn quick(&self, screening: &Screening, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
-        let places = &screening.places;
-        let part = self.study.part(places);
-        let base = base.part(places);
+    /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.
+    fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
         let count = if base.model.parts.is_empty() { self.settings.quick_fits } else { self.settings.fits };
         let before = base.log_evidence();
         let share = self.share(screening);
@@ -328,27 +354,27 @@ impl Search<'_> {
         for promise in shortlist(promises, count) {
             let (kind, model) = (promise.candidate.kind(), base.model.with(&promise.candidate));
             let hopeless = kinds.len() >= LEAST_KINDS && promise.gain < HOPELESS * share * gained;
-            if (hopeless && !kinds.contains(&kind)) || !self.affords(&part, &model) {
+            if (hopeless && !kinds.contains(&kind)) || !self.affords(part, &model) {
                 continue;
             }
             if !kinds.contains(&kind) {
                 kinds.push(kind);
             }
-            let begin = begin(&part, &base, &model, &promise);
-            let fit = fit(&part, model, begin, Effort::Quick);
+            let begin = begin(part, base, &model, &promise);
+            let fit = fit(part, model, begin, Effort::Quick);
             gained = gained.max(fit.log_evidence() - before);
             quick.push(fit);
         }
         let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
         sort(&mut quick);
         // Half or one and a half times as strong an effect may lie beyond a ridge that no descent crosses.
-        let within = |fit: &Fit| self.affords(&part, &fit.model);
+        let within = |fit: &Fit| self.affords(part, &fit.model);
         if let Some(best) = quick.first_mut().filter(|best| within(best)) {
-            shake(&part, best);
+            shake(part, best);
         }
         // Twins (a tilt and a force) reach the same optimum or neither: one that was found is where the other begins.
         if let Some(best) = quick.first().cloned() {
-            quick.iter_mut().skip(1).filter(|other| within(other)).for_each(|other| follow(&part, &best, other));
+            quick.iter_mut().skip(1).filter(|other| within(other)).for_each(|other| follow(part, &best, other));
             sort(&mut quick);
         }
         // Of one kind's several places the best.

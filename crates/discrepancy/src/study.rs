@@ -11,7 +11,7 @@ use crate::trial::groups;
 use crate::whitener::Whitener;
 
 /// Episodes with their whiteners.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Study<'a> {
     /// Simulates.
     pub simulator: &'a Simulator<'a>,
