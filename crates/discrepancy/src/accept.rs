@@ -122,6 +122,36 @@ fn standard_error_of_sum(gains: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Model;
+
+    /// A fit that leaves residuals of this size in each of four episodes.
+    fn leaves(size: f64) -> Fit {
+        let residuals = vec![DVector::from_element(20, size); 4];
+        Fit { model: Model::nominal(0, 0), x: Vec::new(), raw: Vec::new(), residuals, jacobian: Vec::new() }
+    }
+
+    /// A round that finds `found` beside `base` in what was fitted, and as much in two held-out episodes.
+    fn round(base: f64, found: f64) -> Round {
+        let heldout = |size: f64| vec![20.0 * size * size; 2];
+        let rival = Rival {
+            gain: leaves(found).log_evidence() - leaves(base).log_evidence(),
+            heldout: heldout(found),
+            fit: leaves(found),
+        };
+        Round { promises: Vec::new(), rivals: vec![rival], base: leaves(base), before: heldout(base), hasty: true }
+    }
+
+    #[test]
+    fn a_pair_is_compared_with_no_effect_not_with_the_first_one() {
+        let pieces = |count: usize| (0..count).map(|place| place..place + 1).collect();
+        let episodes = Episodes { fitted: pieces(4), heldout: pieces(2), counts: vec![20; 2] };
+        let asked = Asked { least: 10.0, steady: false };
+        assert!(both_convince([&round(3.0, 2.5), &round(2.5, 1.0)], &episodes, asked));
+        // Held-out episodes that the first one spoilt and the second does not mend.
+        let mut second = round(2.5, 1.0);
+        second.rivals[0].heldout = vec![20.0 * 100.0; 2];
+        assert!(!both_convince([&round(3.0, 2.5), &second], &episodes, asked));
+    }
 
     #[test]
     fn the_error_of_a_sum_is_that_of_its_terms_times_the_root_of_their_number() {
