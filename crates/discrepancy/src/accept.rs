@@ -30,7 +30,9 @@ const KEPT: f64 = 0.1;
 pub(crate) struct Asked {
     /// Least gain in ln evidence.
     pub(crate) least: f64,
-    /// Whether most episodes have to gain, and held-out ones to have a gap: a ball goes another way at the least provocation, and what explains some of
+    /// Whether held-out episodes have to gain a tenth of what the fitted ones do.
+    pub(crate) kept: bool,
+    /// Whether that, and most episodes have to gain, and held-out ones to have a gap: a ball goes another way at the least provocation, and what explains some of
     /// that hits a few episodes and misses others. Where nothing rolls, a drift or an obstacle may rightly show in few.
     pub(crate) steady: bool,
 }
@@ -47,49 +49,56 @@ pub(crate) struct Episodes {
 
 /// Whether a rival that is fitted to all episodes gains more than `least` in ln evidence, not by one odd episode, and lasts.
 pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked, seed: u64) -> bool {
-    rival.fit.residuals.len() == round.base.residuals.len()
-        && rival.gain > asked.least
-        && agrees(rival, round, episodes, asked)
-        && lasts(&rival.fit, &episodes.fitted, seed)
+    may_convince(rival, episodes, asked, seed) && agrees(rival, round, episodes, asked)
 }
 
 /// Whether a rival might convince beside a second effect that is missing: what that one does may well hit what was held out harder.
-pub(crate) fn may_convince(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked, seed: u64) -> bool {
-    rival.fit.residuals.len() == round.base.residuals.len()
-        && rival.gain > asked.least
-        && lasts(&rival.fit, &episodes.fitted, seed)
+pub(crate) fn may_convince(rival: &Rival, episodes: &Episodes, asked: Asked, seed: u64) -> bool {
+    rival.whole && rival.gain > asked.least && lasts(&rival.fit, &episodes.fitted, seed)
 }
 
 /// Whether both effects of `second` convince together, beside the model that the first one was added to.
 pub(crate) fn both_convince([first, second]: [&Round; 2], episodes: &Episodes, asked: Asked) -> bool {
     let Some(pair) = second.rivals.first() else { return false };
     let gain = pair.fit.log_evidence() - first.base.log_evidence();
-    agrees(&Rival { gain, ..pair.clone() }, first, episodes, asked)
+    agrees(&Rival { gain, ..pair.clone() }, first, episodes, Asked { kept: true, ..asked })
 }
 
-/// Whether the last effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
+/// Whether what was held out is explained better than by another model, of which these are the sums of squares.
+pub(crate) fn better_heldout(found: &[f64], other: &[f64], episodes: &Episodes) -> bool {
+    gains(other, found, &episodes.counts).iter().sum::<f64>() > 0.0
+}
+
+/// Whether each effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
 /// resamples, as wide as the intervals that are reported.
 pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
-    let Some(part) = fit.model.parts.last() else { return false };
-    if part.begin.is_some() {
-        // A body in the way has no sign.
-        return true;
-    }
-    let first = fit.x.len() - part.coordinates.len();
     let mut samples = bootstrap(fit, groups, seed);
     widen(&mut samples, fit);
-    part.strengths().any(|index| {
-        let beyond = |sign: f64| samples.iter().filter(|x| sign * x[first + index] > NEGLIGIBLE).count();
-        beyond(1.0).max(beyond(-1.0)) as f64 >= SAME_SIGN * samples.len() as f64
-    })
+    let mut first = fit.model.tunables + fit.model.errors;
+    !fit.model.parts.is_empty()
+        && fit.model.parts.iter().all(|part| {
+            let own = first;
+            first += part.coordinates.len();
+            // A body in the way has no sign.
+            part.begin.is_some()
+                || part.strengths().any(|index| {
+                    let beyond = |sign: f64| samples.iter().filter(|x| sign * x[own + index] > NEGLIGIBLE).count();
+                    beyond(1.0).max(beyond(-1.0)) as f64 >= SAME_SIGN * samples.len() as f64
+                })
+        })
+}
+
+/// What each held-out piece gains in ln p from one model to another, by their sums of squares.
+fn gains(before: &[f64], after: &[f64], counts: &[usize]) -> Vec<f64> {
+    (before.iter().zip(after).zip(counts))
+        .map(|((before, after), count)| episode_cost(*before, *count) - episode_cost(*after, *count))
+        .collect()
 }
 
 /// Whether what was held out is explained no worse, and the effect shows in more than one episode, whether fitted or held out: an odd one names
 /// nothing.
 fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bool {
-    let heldout: Vec<f64> = (round.before.iter().zip(&rival.heldout).zip(&episodes.counts))
-        .map(|((before, after), count)| episode_cost(*before, *count) - episode_cost(*after, *count))
-        .collect();
+    let heldout = gains(&round.before, &rival.heldout, &episodes.counts);
     let cost = |residuals: &DVector<f64>| episode_cost(residuals.norm_squared(), residuals.len());
     let fitted: Vec<f64> = round
         .base
@@ -108,8 +117,9 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
     let expected = fitted.iter().sum::<f64>() * episodes.heldout.len() as f64 / episodes.fitted.len().max(1) as f64;
     let kept = heldout.iter().sum::<f64>() > KEPT * expected;
     let gap = round.before.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
-    let steady = !asked.steady || (gap && kept && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
-    steady && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * asked.least
+    let kept = kept || !(asked.kept || asked.steady);
+    let steady = !asked.steady || (gap && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
+    steady && kept && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * asked.least
 }
 
 /// Of a sum of independent gains that scatter as these do.
@@ -137,6 +147,7 @@ mod tests {
             gain: leaves(found).log_evidence() - leaves(base).log_evidence(),
             heldout: heldout(found),
             fit: leaves(found),
+            whole: true,
         };
         Round { promises: Vec::new(), rivals: vec![rival], base: leaves(base), before: heldout(base), hasty: true }
     }
@@ -145,11 +156,11 @@ mod tests {
     fn a_pair_is_compared_with_no_effect_not_with_the_first_one() {
         let pieces = |count: usize| (0..count).map(|place| place..place + 1).collect();
         let episodes = Episodes { fitted: pieces(4), heldout: pieces(2), counts: vec![20; 2] };
-        let asked = Asked { least: 10.0, steady: false };
+        let asked = Asked { least: 10.0, kept: false, steady: false };
         assert!(both_convince([&round(3.0, 2.5), &round(2.5, 1.0)], &episodes, asked));
         // Held-out episodes that the first one spoilt and the second does not mend.
         let mut second = round(2.5, 1.0);
-        second.rivals[0].heldout = vec![20.0 * 100.0; 2];
+        second.rivals[0].heldout = vec![20.0 * 9.0; 2];
         assert!(!both_convince([&round(3.0, 2.5), &second], &episodes, asked));
     }
 

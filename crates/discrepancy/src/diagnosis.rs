@@ -22,6 +22,9 @@ use crate::simulator::Simulator;
 use crate::study::Study;
 use crate::trial::{Trial, groups};
 
+/// A log of so many episodes may take the whole budget.
+const EPISODES: usize = 40;
+
 /// What the search may do.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -39,7 +42,8 @@ pub struct Settings {
     pub threshold_rolling: f64,
     /// Effects at most.
     pub effects: usize,
-    /// After this many simulated episodes no further effect is looked for, and of rivals the first alone is fitted to all.
+    /// After this many simulated episodes no further effect is looked for, and of rivals the first alone is fitted to all. This and the next two are of logs
+    /// of 40 episodes or fewer, and in proportion of longer ones.
     pub rollouts: usize,
     /// After this many fits end where they are.
     pub most: usize,
@@ -56,6 +60,14 @@ pub struct Settings {
     pub another: f64,
     /// Chance that some channel in some phase would stand out as much under a right model, below which what is left is no chance.
     pub left_by_chance: f64,
+}
+
+impl Settings {
+    /// For a log of so many episodes.
+    fn of_episodes(&self, episodes: usize) -> Self {
+        let scaled = |count: usize| count.saturating_mul(episodes.max(EPISODES)) / EPISODES;
+        Self { rollouts: scaled(self.rollouts), most: scaled(self.most), limit: scaled(self.limit), ..self.clone() }
+    }
 }
 
 impl Default for Settings {
@@ -92,7 +104,8 @@ pub struct Diagnosis {
     pub nominal: Fit,
     /// The accepted model; the nominal one where nothing was.
     pub model: Fit,
-    /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out or no more effects are allowed.
+    /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out, no more effects are allowed, two were found at once or
+    /// the budget is used up.
     pub rounds: Vec<Round>,
     /// Sums of squares of the held-out episodes: nominal and accepted model, with the errors of the accepted one.
     pub heldout: [Vec<f64>; 2],
@@ -124,6 +137,7 @@ pub struct Diagnosis {
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
     let noise = NoiseLevels::of_log(log);
     let (trials, [fitted, heldout]) = trials(log, name, nominal, &noise, settings.seed)?;
+    let settings = &settings.of_episodes(groups(trials.iter()).len());
     let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]);
     let engine = nominal.engine();
     // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search to all episodes, with care
@@ -138,7 +152,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let mut x = first.x;
     x.resize(model.count(), 0.0);
     let null = fit(&part, model, Begin::at(&x), Effort::Quick);
-    let context = context(&simulator, &null, log, &noise);
+    let context = context(&study, &null, log, &noise);
     let screening = Screening::new(&part, places, &null, &candidates(&context));
     let kept = Study::new(&simulator, engine, heldout);
     let mut search = Search { study, kept, part, settings };

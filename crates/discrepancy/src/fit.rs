@@ -53,6 +53,10 @@ impl Fit {
     /// Laplace's ln evidence.
     #[must_use]
     pub fn log_evidence(&self) -> f64 {
+        let cost = self.cost();
+        if cost.is_infinite() {
+            return f64::NEG_INFINITY;
+        }
         let n = self.x.len();
         let weights = weights(&self.residuals);
         let hessian = DMatrix::from_fn(n, n, |i, j| {
@@ -61,7 +65,7 @@ impl Fit {
         let determinant =
             hessian.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
         let sides = self.model.one_sided() as f64 * std::f64::consts::LN_2;
-        -self.cost() - 0.5 * determinant + sides
+        -cost - 0.5 * determinant + sides
     }
 }
 
@@ -130,6 +134,10 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             if step.promise < WORTHWHILE || (!moved && round > 0 && step.promise < 6.0 * WORTHWHILE) {
                 break;
             }
+            // Broyden's changes by a long step, even one that is not taken, reach farther than a finite difference.
+            if step.delta.amax() >= NEAR * STEP {
+                fresh = None;
+            }
             let next: Vec<f64> = x.iter().zip(step.delta.iter()).map(|(x, d)| x + d).collect();
             let found_raw = study.raw(&model.hypothesis(&next));
             let found = study.white(&found_raw, model.engine_errors(&next));
@@ -158,7 +166,9 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
 /// −ln posterior but for a constant.
 #[must_use]
 pub fn cost(x: &[f64], residuals: &Stack) -> f64 {
-    likelihood::cost(residuals) + 0.5 * x.iter().map(|x| x * x).sum::<f64>()
+    let cost = likelihood::cost(residuals) + 0.5 * x.iter().map(|x| x * x).sum::<f64>();
+    // Residuals of a simulation that went astray need not be finite.
+    if cost.is_nan() { f64::INFINITY } else { cost }
 }
 
 /// Finite differences at `x`.

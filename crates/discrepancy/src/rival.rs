@@ -10,6 +10,8 @@ use crate::screen::Promise;
 pub struct Rival {
     /// Its fit; the further effect is the last of the model's parts.
     pub fit: Fit,
+    /// Whether it was fitted to all episodes, not to those of the screening alone.
+    pub whole: bool,
     /// ln evidence over that of the model without; of what was fitted to the episodes of the screening alone what that promises for all.
     pub gain: f64,
     /// Sums of squares of the held-out episodes.

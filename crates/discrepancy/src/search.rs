@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use physics_model::{EffectConfig, EffectKind};
 
-use crate::accept::{Asked, Episodes, both_convince, convinces, lasts, may_convince};
+use crate::accept::{Asked, Episodes, better_heldout, both_convince, convinces, lasts, may_convince};
 use crate::begin::{begin, follow, shake};
 use crate::candidate::Candidate;
 use crate::diagnosis::Settings;
@@ -25,7 +25,7 @@ const HOPELESS: f64 = 0.1;
 const LEAST_KINDS: usize = 2;
 /// What keeps this share of what it promised in the episodes of the screening says what others would keep.
 const MOST_KEEP: f64 = 0.5;
-/// A null that leaves more than this share of the best effect's gain unexplained was no place to learn errors at.
+/// If an effect gains more than this in ln evidence of the episodes of the screening, a model without was no place to learn errors at.
 const FAR: f64 = 100.0;
 
 /// The search for effects.
@@ -60,7 +60,7 @@ impl Search<'_> {
         let within = |search: &Self| search.study.simulator.rollouts() <= settings.rollouts;
         while rounds.is_empty() || (accepted.model.parts.len() < settings.effects && within(self)) {
             let mut round = self.round(screening, &accepted);
-            let mut found = self.choose(&mut round, episodes, explained);
+            let mut found = settings.effects > 0 && self.choose(&mut round, episodes, explained);
             if !found && round.hasty {
                 if let Some(pair) = self.both(screening, &mut round, episodes) {
                     accepted = pair.best(true).clone();
@@ -115,13 +115,13 @@ impl Search<'_> {
         let rolls = self.study.simulator.nominal.rolls();
         let threshold = if rolls { self.settings.threshold_rolling } else { self.settings.threshold };
         // The errors of a solver grow with what it is asked to explain.
-        Asked { least: threshold.max(SECOND_SHARE * explained), steady: rolls }
+        Asked { least: threshold.max(SECOND_SHARE * explained), kept: rolls, steady: rolls }
     }
 
     /// The round of a second effect beside the first rival, which does not convince alone, if both do together: the rivals before that one are dropped then.
     fn both(&mut self, screening: &Screening, round: &mut Round, episodes: &Episodes) -> Option<Round> {
         let (asked, seed) = (self.asked(0.0), self.settings.seed);
-        let first = round.rivals.iter().position(|rival| may_convince(rival, round, episodes, asked, seed))?;
+        let first = round.rivals.iter().position(|rival| may_convince(rival, episodes, asked, seed))?;
         if self.settings.effects < 2 || self.study.simulator.rollouts() > self.settings.rollouts {
             return None;
         }
@@ -146,7 +146,7 @@ impl Search<'_> {
                 let fit = fit(&self.study, rival.fit.model.clone(), Begin::at(&rival.fit.x), Effort::Full);
                 let gain = fit.log_evidence() - without - self.finer_steps(&round.base, &fit);
                 change.get_or_insert(gain - rival.gain);
-                *rival = Rival { heldout: self.heldout(&fit), gain, fit };
+                *rival = Rival { heldout: self.heldout(&fit), gain, fit, whole: true };
             } else {
                 // What care brings the first it might bring the others.
                 rival.gain += change.unwrap_or(0.0);
@@ -154,6 +154,7 @@ impl Search<'_> {
         }
         round.hasty = false;
         sort(&mut round.rivals);
+        self.tune(round);
     }
 
     /// Puts a rival of the first effect in its place where that does better beside the second: which of those it was is plainer there.
@@ -170,7 +171,9 @@ impl Search<'_> {
         let Some((lead, others)) = first.rivals.split_first_mut() else { return };
         let Some(as_found) = beside(lead) else { return };
         let mut best: Option<(usize, Fit)> = None;
-        for (index, rival) in others.iter_mut().enumerate().filter(|(_, rival)| rival.kind() != added.kind()) {
+        // Bounces come with finer steps, which no other model has.
+        let comparable = |rival: &Rival| rival.kind() != added.kind() && rival.kind() != EffectKind::Restitution;
+        for (index, rival) in others.iter_mut().enumerate().filter(|(_, rival)| comparable(rival)) {
             let Some(fit) = beside(rival) else { break };
             let more = fit.log_evidence() - as_found.log_evidence();
             rival.gain = lead.gain + self.share(screening) * more;
@@ -178,6 +181,7 @@ impl Search<'_> {
                 best = Some((index, fit));
             }
         }
+        let mut most = lead.gain;
         let best = best.filter(|(_, fit)| self.affords(&self.study, &fit.model));
         if let Some((index, begin)) = best {
             let fit = fit(&self.study, begin.model, Begin::at(&begin.x), Effort::Full);
@@ -186,18 +190,18 @@ impl Search<'_> {
             let more = fit.log_evidence() - pair.fit.log_evidence();
             others[index].gain = lead.gain + more;
             if more > 0.0
-                && heldout.iter().sum::<f64>() < pair.heldout.iter().sum()
+                && better_heldout(&heldout, &pair.heldout, episodes)
                 && lasts(&fit, &episodes.fitted, self.settings.seed)
             {
-                *pair = Rival { heldout, gain: pair.gain, fit };
-                sort(&mut first.rivals);
-                return;
+                *pair = Rival { heldout, gain: pair.gain, fit, whole: true };
+                most = others[index].gain;
+                first.rivals.swap(0, index + 1);
             }
         }
         // No rival that was not better in all episodes comes before what is kept.
-        let most = lead.gain;
+        let [_, others @ ..] = first.rivals.as_mut_slice() else { return };
         others.iter_mut().for_each(|rival| rival.gain = rival.gain.min(most));
-        sort(&mut first.rivals);
+        sort(others);
     }
 
     /// How many times as much all episodes say as those of the screening.
@@ -239,8 +243,7 @@ impl Search<'_> {
             let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
             base = fit(&self.study, base.model, Begin::at(&base.x), effort);
         }
-        let fits = if first { self.settings.fits } else { 1 };
-        quick.truncate(fits);
+        quick.truncate(self.settings.fits);
         let lead = quick.first().map_or(0.0, Fit::log_evidence);
         let without = base.log_evidence();
         let share = self.share(screening);
@@ -253,6 +256,7 @@ impl Search<'_> {
                     heldout: self.heldout(&quick),
                     gain: share * (quick.log_evidence() - before),
                     fit: quick,
+                    whole: false,
                 };
             }
             let fit = fit(&self.study, quick.model, Begin::at(&quick.x), effort);
@@ -260,24 +264,29 @@ impl Search<'_> {
                 heldout: self.heldout(&fit),
                 gain: fit.log_evidence() - without - self.finer_steps(&base, &fit),
                 fit,
+                whole: true,
             }
         };
+        let alone = hasty || !first;
         let mut rivals: Vec<Rival> = (quick.into_iter().enumerate())
             .map(|(rank, quick)| {
                 // Those far behind need no exact optimum: what they gain in the episodes of the screening they gain in all.
                 let gain = quick.log_evidence();
-                let affordable = !hasty && self.study.simulator.rollouts() < self.settings.rollouts;
+                let affordable = !alone && self.study.simulator.rollouts() < self.settings.rollouts;
                 if rank == 0 || (lead - gain < NEAR && affordable) {
                     fully(quick)
                 } else {
-                    Rival { heldout: self.heldout(&quick), fit: quick, gain: share * (gain - before) }
+                    Rival { heldout: self.heldout(&quick), fit: quick, gain: share * (gain - before), whole: false }
                 }
             })
             .collect();
-        if hasty && let [first, others @ ..] = rivals.as_mut_slice() {
+        if alone
+            && let [first, others @ ..] = rivals.as_mut_slice()
+            && first.whole
+        {
             // What the others gain in the episodes of the screening is not what a fit to all does, but by how much less than the first it is: unless that
             // keeps too little of what it promised to say so.
-            let (kept, promised) = (first.fit.log_evidence() - without, share * (lead - before));
+            let (kept, promised) = (first.gain, share * (lead - before));
             if kept > MOST_KEEP * promised {
                 others.iter_mut().for_each(|other| other.gain += kept - promised);
             }
@@ -286,26 +295,29 @@ impl Search<'_> {
             sort(&mut rivals);
             // Unless those before do not keep what they promise.
             match rivals.first() {
-                Some(first)
-                    if first.fit.residuals.len() < self.study.chosen.len()
-                        && self.affords(&self.study, &first.fit.model) =>
-                {
+                Some(first) if !first.whole && self.affords(&self.study, &first.fit.model) => {
                     let first = rivals.swap_remove(0);
                     rivals.push(fully(first.fit));
                 }
                 _ => break,
             }
         }
-        let again = rivals
-            .first()
+        let mut round = Round { promises, rivals, before: self.heldout(&base), base, hasty };
+        self.tune(&mut round);
+        round
+    }
+
+    /// Fits the model without an effect again where that can do what the first rival does.
+    fn tune(&self, round: &mut Round) {
+        let again = (round.rivals.first())
             .filter(|first| self.affords(&self.study, &first.fit.model))
-            .and_then(|first| self.retuned(&base, &first.fit));
+            .and_then(|first| self.retuned(&round.base, &first.fit));
         if let Some(again) = again {
-            let gained = again.log_evidence() - base.log_evidence();
-            rivals.iter_mut().for_each(|rival| rival.gain -= gained);
-            base = again;
+            let gained = again.log_evidence() - round.base.log_evidence();
+            round.rivals.iter_mut().for_each(|rival| rival.gain -= gained);
+            round.before = self.heldout(&again);
+            round.base = again;
         }
-        Round { promises, rivals, before: self.heldout(&base), base, hasty }
     }
 
     /// What a bounce gains by its finer steps alone, which are no bounce: they suit balls.
@@ -365,6 +377,7 @@ impl Search<'_> {
             gained = gained.max(fit.log_evidence() - before);
             quick.push(fit);
         }
+        quick.retain(|fit| fit.log_evidence().is_finite());
         let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
         sort(&mut quick);
         // Half or one and a half times as strong an effect may lie beyond a ridge that no descent crosses.
