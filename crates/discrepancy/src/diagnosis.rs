@@ -49,7 +49,8 @@ pub struct Settings {
     pub most: usize,
     /// No fit of an effect begins a simulation that would end above this many; what is decided, drawn and told of the last ones adds up to 160.
     pub limit: usize,
-    /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story.
+    /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story. Of the
+    /// fitted episodes that are above it before anything is named, what is named has to close half of a typical one's gap, too.
     pub unexplained: f64,
     /// The same of the held-out ones before anything is named, from which on what is named has to close half of the gap of a typical one;
     /// a body in the way, which shows where it is met, has not.

@@ -1,12 +1,14 @@
 //! What a diagnosis says: the contract of `report.json`.
 
+use std::ops::Range;
+
 use physics_model::EffectKind;
 use serde::Serialize;
 
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::evidence::Evidence;
 use crate::interval::{bootstrap, middle_90, widen};
-use crate::likelihood::{NOISE_FLOOR, trimmed_mean};
+use crate::likelihood::{NOISE_FLOOR, mean_square, trimmed_mean};
 use crate::locate::Cell;
 use crate::separate;
 
@@ -153,8 +155,16 @@ impl Report {
         widen(&mut samples, &diagnosis.model);
         let effects = effects(diagnosis, &samples);
         // A body in the way shows in the episodes that meet it, whatever the others lack.
+        let heldout = diagnosis.heldout_episodes.iter().map(|(_, before, after)| [*before, *after]);
+        let of_models = |group: &Range<usize>| {
+            [&diagnosis.nominal, &diagnosis.model].map(|fit| mean_square(&fit.residuals[group.clone()]))
+        };
+        let fitted = diagnosis.pieces.iter().map(of_models);
         let everywhere = diagnosis.model.model.parts.iter().any(|part| part.begin.is_none());
-        let beside_it = everywhere && before > settings.gap && typical_closing(diagnosis, settings.gap) < HALF;
+        // Of what was fitted, where the gap is plain: a cause that few episodes meet need not show in those held out.
+        let beside_it = everywhere
+            && ((before > settings.gap && typical_closing(heldout, settings.gap) < HALF)
+                || typical_closing(fitted, settings.unexplained) < HALF);
         let odd = effects.is_empty() && diagnosis.heldout_episodes.iter().any(|(_, _, after)| *after > settings.odd);
         let chance = diagnosis.remaining.iter().map(|cell| cell.p_value).fold(1.0, f64::min);
         let unexplained = beside_it || odd || is_left(left, chance, closed_fraction, settings);
@@ -201,11 +211,11 @@ fn is_left(trimmed_mean: f64, chance: f64, closed_fraction: f64, settings: &Sett
     much || little
 }
 
-/// Median over the held-out episodes with a mean square above `gap` of the share of it that is closed; 1 where there are too few to say.
-fn typical_closing(diagnosis: &Diagnosis, gap: f64) -> f64 {
-    let closing = |(_, before, after): &(u64, f64, f64)| (before - after) / (before - NOISE_FLOOR);
-    let mut closings: Vec<f64> =
-        diagnosis.heldout_episodes.iter().filter(|(_, before, _)| *before > gap).map(closing).collect();
+/// Median over the episodes with a mean square above `gap` of the share of it that is closed; 1 where there are too few to say. Of each episode: mean
+/// squares under the nominal and the accepted model.
+fn typical_closing(episodes: impl Iterator<Item = [f64; 2]>, gap: f64) -> f64 {
+    let plain = episodes.filter(|[before, _]| *before > gap);
+    let mut closings: Vec<f64> = plain.map(|[before, after]| (before - after) / (before - NOISE_FLOOR)).collect();
     if closings.len() < LEAST_GAPS {
         return 1.0;
     }
@@ -334,6 +344,16 @@ fn describe(remaining: &[Cell]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_closes_little_of_the_plain_gaps_stands_for_something_else() {
+        // A magnet that three of six episodes meet, taken for a tilt.
+        let met = [[1.2, 0.9], [2.0, 1.9], [1.3, 1.1], [1.1, 1.1], [5.0, 4.1], [13.0, 13.6]];
+        assert!(typical_closing(met.into_iter(), 1.4) < HALF);
+        // Two episodes are no rule, and one odd one of four is none.
+        assert_eq!(typical_closing(met.into_iter().take(5), 1.4), 1.0);
+        assert!(typical_closing([[3.0, 1.0], [4.0, 1.1], [2.0, 0.9], [9.0, 9.5]].into_iter(), 1.4) > HALF);
+    }
 
     #[test]
     fn much_is_left_whatever_stands_out_and_little_where_it_stands_out() {
