@@ -232,17 +232,7 @@ impl Search<'_> {
         let promises = screening.promises(&part, &begin, self.study.chosen.len());
         let mut quick = self.quick(screening, &part, &begin, &promises);
         let before = begin.log_evidence();
-        let mut base = base.clone();
-        if first {
-            let best = quick.first().filter(|best| best.log_evidence() - before > FAR);
-            // How large errors are is learnt where the model is nearly right: with what explains most.
-            let right = best.unwrap_or(&base);
-            let hypothesis = right.model.hypothesis(&right.x);
-            self.study.learn_errors(&hypothesis);
-            self.kept.learn_errors(&hypothesis);
-            let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
-            base = fit(&self.study, base.model, Begin::at(&base.x), effort);
-        }
+        let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
         quick.truncate(self.settings.fits);
         let lead = quick.first().map_or(0.0, Fit::log_evidence);
         let without = base.log_evidence();
@@ -305,6 +295,18 @@ impl Search<'_> {
         let mut round = Round { promises, rivals, before: self.heldout(&base), base, hasty };
         self.tune(&mut round);
         round
+    }
+
+    /// The model without an effect, which knew the episodes of the screening alone, fitted to all. How large errors are is learnt where the model is nearly
+    /// right: with what explains most, if that gains much.
+    fn without_effect(&mut self, base: &Fit, best: Option<&Fit>) -> Fit {
+        let best = best.filter(|best| best.log_evidence() - base.log_evidence() > FAR);
+        let right = best.unwrap_or(base);
+        let hypothesis = right.model.hypothesis(&right.x);
+        self.study.learn_errors(&hypothesis);
+        self.kept.learn_errors(&hypothesis);
+        let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
+        fit(&self.study, base.model.clone(), Begin::at(&base.x), effort)
     }
 
     /// Fits the model without an effect again where that can do what the first rival does.
