@@ -256,8 +256,7 @@ impl<'a> World<'a> {
         self.later(memory.elapsed_secs, &memory.hidden)
     }
 
-    /// The same world `time_secs` after the episode began, with the bodies that only effects know of where `hidden` has them. Only for a
-    /// world that has not made a step.
+    /// The same world `time_secs` after the episode began, bodies that only effects know of where `hidden` has them. Only before its first step.
     pub(crate) fn later(mut self, time_secs: f64, hidden: &[BodyState]) -> Self {
         self.time_secs = time_secs;
         for (body, state) in self.hidden.iter().zip(hidden).filter(|(body, _)| body.dynamic) {
@@ -283,8 +282,7 @@ impl<'a> World<'a> {
         self.hidden.iter().map(|body| self.body_state(body)).collect()
     }
 
-    /// The same world with the tool on a dynamic arm, at rest at `joints_rad`, which must be those of the tool's pose. Only for a
-    /// world that has not made a step.
+    /// The same world with the tool on a dynamic arm, at rest at `joints_rad`, which must be those of the tool's pose. Only before its first step.
     ///
     /// # Panics
     ///
@@ -396,8 +394,7 @@ impl<'a> World<'a> {
         self.obstacle.as_ref().map(|body| self.body_state(body))
     }
 
-    /// Why the world as it is now makes its hypothesis impossible, if it does. Overlaps are not looked for here: see
-    /// [`crate::feasible::check_overlaps`].
+    /// Why the world as it is now makes its hypothesis impossible, if it does; for overlaps see [`crate::feasible::check_overlaps`].
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         if self.arm_joints_rad().is_some_and(|joints| joints.iter().any(|v| !v.is_finite())) {
