@@ -32,7 +32,7 @@ pub(crate) struct Asked {
     pub(crate) least: f64,
     /// Whether held-out episodes have to gain a tenth of what the fitted ones do.
     pub(crate) kept: bool,
-    /// Whether that, and most episodes have to gain, and held-out ones to have a gap: a ball goes another way at the least provocation, and what explains some of
+    /// Whether most episodes have to gain, and held-out ones to have a gap: a ball goes another way at the least provocation, and what explains some of
     /// that hits a few episodes and misses others. Where nothing rolls, a drift or an obstacle may rightly show in few.
     pub(crate) steady: bool,
 }
@@ -115,9 +115,8 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
     let slack = HELDOUT_SLACK.max(HELDOUT_SHARE * rival.gain);
     // What the fitted episodes gained the held-out ones should, too.
     let expected = fitted.iter().sum::<f64>() * episodes.heldout.len() as f64 / episodes.fitted.len().max(1) as f64;
-    let kept = heldout.iter().sum::<f64>() > KEPT * expected;
+    let kept = !asked.kept || heldout.iter().sum::<f64>() > KEPT * expected;
     let gap = round.before.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
-    let kept = kept || !(asked.kept || asked.steady);
     let steady = !asked.steady || (gap && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
     steady && kept && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * asked.least
 }

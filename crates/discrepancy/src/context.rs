@@ -10,7 +10,6 @@ use crate::noise::NoiseLevels;
 use crate::obstacle::{self, Outlines, Place, distance};
 use crate::patch;
 use crate::simulator::{Nudge, Simulator};
-use crate::study::Study;
 use crate::trial::{Kind, Trial};
 
 /// Places that are tried for what is tied to one.
@@ -23,16 +22,15 @@ const OBSTACLES: usize = 5;
 /// The same for a patch.
 const PATCHES: usize = 4;
 
-/// Where the object went in the episodes of the study, and what the log has: held-out episodes say nothing of where something may be.
-pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
-    let nominal = study.simulator.nominal;
-    let trials: Vec<&Trial> = study.chosen.iter().map(|index| &study.simulator.trials[*index]).collect();
+/// Where the object went and what the log has.
+pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
+    let nominal = simulator.nominal;
     let engine = nominal.engine();
     let (world, theta) = nominal.rig(&null.x, &engine).nominal(&nominal.object(&null.x, 0.0, &engine));
     let has = |kind: Kind| noise.of(kind).is_some();
     let mut path: Vec<[f64; 2]> = Vec::new();
     let mut largest_force_n = 0.0_f64;
-    for episode in log.episodes.iter().filter(|episode| trials.iter().any(|trial| trial.id == episode.id)) {
+    for episode in &log.episodes {
         for row in 0..episode.rows() {
             if let Some([x, y, _]) = episode.vector(measured_log::Channel::ObjectPosition, row)
                 && path.last().is_none_or(|last| distance(*last, [x, y]) > MOVED_M)
@@ -44,7 +42,7 @@ pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels)
             }
         }
     }
-    let (obstacles_m, patches_m) = placed(study.simulator, &trials, null, &theta.object);
+    let (obstacles_m, patches_m) = placed(simulator, null, &theta.object);
     Context {
         world,
         theta,
@@ -76,10 +74,10 @@ fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
 }
 
 /// Places at which something may stand in the way, and where the table may be rougher or smoother.
-fn placed(simulator: &Simulator, trials: &[&Trial], null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<Place>) {
+fn placed(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<Place>) {
     let hypothesis = null.model.hypothesis(&null.x);
     let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
-    let courses: Vec<(&Trial, Vec<_>)> = trials.par_iter().map(|trial| (*trial, simulate(trial))).collect();
+    let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
     let [x, y, _] = object.size_m;
     let outlines = Outlines {
         sides_m: (object.shape == ObjectShape::Box).then_some([0.5 * x, 0.5 * y]),

@@ -63,6 +63,13 @@ fn what_the_catalogue_does_not_have_is_called_unknown() {
 }
 
 #[test]
+fn what_is_in_the_way_is_named() {
+    let (found, _) = report("set-006", None);
+    assert_eq!(found.verdict, Verdict::Effect, "{}", found.summary);
+    assert_eq!(found.effects[0].name, "hidden_obstacle");
+}
+
+#[test]
 fn the_answer_does_not_depend_on_the_number_of_threads() {
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
