@@ -23,10 +23,12 @@
 pub mod actions;
 pub mod draw;
 pub mod folder;
+pub mod gaussian_process;
 pub mod generate;
 pub mod plan;
 pub mod recording;
 pub mod rehearsal;
+pub mod residual;
 pub mod score;
 pub mod table;
 pub mod unknown;

@@ -119,8 +119,9 @@ fn run(arguments: &Arguments) -> Result<bool> {
     if !arguments.score_only && !answer(&folder, &plan, &diagnose, arms, &pool, &interrupted)? {
         return Ok(false);
     }
+    let one = |set| score(&folder, set, arms, arguments.baselines);
     let results: Vec<Result<Option<Score>>> =
-        pool.install(|| (0..plan.len()).into_par_iter().with_max_len(1).map(|set| score(&folder, set, arms)).collect());
+        pool.install(|| (0..plan.len()).into_par_iter().with_max_len(1).map(one).collect());
     let scores: Vec<Score> =
         results.into_iter().filter_map(Result::transpose).collect::<Result<_>>().context(Failed)?;
     let table = Table::new(&scores, plan.len() - scores.len(), arguments.baselines);

@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use anyhow::Result;
-use discrepancy::{ModelFile, Nominal, heldout, rig_tool};
+use discrepancy::heldout::{self, Explanation};
+use discrepancy::{ModelFile, Nominal, rig_tool};
 use serde::{Deserialize, Serialize};
 
 use crate::folder::{self, Folder};
 use crate::generate::Actions;
 use crate::plan::{Group, Truth};
+use crate::residual;
 
 /// What the scorer reads of `report.json`.
 #[derive(Clone, Debug, Deserialize)]
@@ -76,6 +78,9 @@ pub struct Reference {
     pub truth: f64,
     /// Of the nominal model as the log gives it.
     pub untuned: f64,
+    /// Of the model re-tuned and corrected by Gaussian processes, where asked for.
+    #[serde(default)]
+    pub process: Option<f64>,
 }
 
 /// An answer scored.
@@ -109,6 +114,8 @@ pub struct Score {
     pub covered: Vec<(String, bool)>,
     /// Held-out error of re-tuning, of the answer, of the truth, of no re-tuning.
     pub heldout: Option<[f64; 4]>,
+    /// The same of re-tuning and Gaussian processes of what it leaves.
+    pub process: Option<f64>,
     /// Channel of the largest residual that is significant.
     pub channel: Option<String>,
     /// Simulated episodes.
@@ -143,6 +150,7 @@ impl Score {
             both: effect && names.iter().all(|name| named.contains(name)),
             covered,
             heldout: reference.map(|r| [answer.heldout.before, answer.heldout.after, r.truth, r.untuned]),
+            process: reference.and_then(|r| r.process),
             channel: answer.located.first().filter(|l| l.p_value < P_VALUE).map(|l| l.channel.clone()),
             confidence: answer.effects.first().map(|effect| effect.confidence),
             truth: names,
@@ -156,7 +164,17 @@ impl Score {
     /// Share of the gap between re-tuning and truth that the answer closes, at most 1; `None` where there is hardly any.
     #[must_use]
     pub fn closed(&self) -> Option<f64> {
-        let [before, after, truth, _] = self.heldout?;
+        self.closed_by(self.heldout?[1])
+    }
+
+    /// The same of Gaussian processes instead of the answer.
+    #[must_use]
+    pub fn closed_by_process(&self) -> Option<f64> {
+        self.closed_by(self.process?)
+    }
+
+    fn closed_by(&self, after: f64) -> Option<f64> {
+        let [before, _, truth, _] = self.heldout?;
         (before - truth > LEAST_GAP).then(|| ((before - after) / (before - truth)).min(1.0))
     }
 
@@ -209,12 +227,12 @@ fn covered(truth: &Truth, named: &Named) -> Vec<(String, bool)> {
         .collect()
 }
 
-/// Scores a set; `None` where it has no answer.
+/// Scores a set; `None` where it has no answer. `baselines`: with what Gaussian processes reach on those of the catalogue.
 ///
 /// # Errors
 ///
 /// Files that cannot be read.
-pub fn score(folder: &Folder, set: usize, arms: Option<&Path>) -> Result<Option<Score>> {
+pub fn score(folder: &Folder, set: usize, arms: Option<&Path>, baselines: bool) -> Result<Option<Score>> {
     if !folder.is_answered(set) || !folder.truth(set).exists() {
         return Ok(None);
     }
@@ -223,7 +241,7 @@ pub fn score(folder: &Folder, set: usize, arms: Option<&Path>) -> Result<Option<
     let reference = match truth.group {
         // No model of ours is true.
         Group::Unknown => None,
-        _ => Some(reference(folder, set, &truth, arms)?),
+        group => Some(reference(folder, set, &truth, arms, baselines && group == Group::Catalogue)?),
     };
     Ok(Some(Score::new(set, &truth, &answer, reference)))
 }
@@ -236,11 +254,12 @@ struct Kept {
 }
 
 /// Computed once an answer.
-fn reference(folder: &Folder, set: usize, truth: &Truth, arms: Option<&Path>) -> Result<Reference> {
+fn reference(folder: &Folder, set: usize, truth: &Truth, arms: Option<&Path>, process: bool) -> Result<Reference> {
     let (path, model_path) = (folder.reference(set), folder.answer(set).join("model.toml"));
     let model = blake3::hash(&std::fs::read(&model_path)?).to_hex().to_string();
     if let Ok(kept) = folder::read::<Kept>(&path)
         && kept.model == model
+        && (kept.reference.process.is_some() || !process)
     {
         return Ok(kept.reference);
     }
@@ -250,8 +269,10 @@ fn reference(folder: &Folder, set: usize, truth: &Truth, arms: Option<&Path>) ->
     ModelFile::read(&model_path)?.apply(&mut found)?;
     let mut right = Nominal::new(&truth.spec.true_header(), rig_tool(&log, arms)?)?;
     right.effects = truth.spec.effects.clone();
-    let squares = heldout::mean_squares(&log, &found, &[&right, &untuned], SOLVER_SEED);
-    let reference = Reference { truth: squares[0], untuned: squares[1] };
+    let squares =
+        heldout::mean_squares(&log, &found, &[Explanation::of(&right), Explanation::of(&untuned)], SOLVER_SEED);
+    let process = process.then(|| residual::mean_square(&log, &untuned, &found, SOLVER_SEED));
+    let reference = Reference { truth: squares[0], untuned: squares[1], process };
     folder::save(&path, &Kept { model, reference })?;
     Ok(reference)
 }
@@ -296,10 +317,11 @@ mod tests {
             "parameters": [{"key": "slope_x_rad", "value": 0.021, "interval90": [0.019, 0.022]},
                            {"key": "slope_y_rad", "value": -0.02, "interval90": [-0.03, -0.015]}]}]"#,
         );
-        let score = Score::new(0, &truth, &said, Some(Reference { truth: 1.0, untuned: 5.0 }));
+        let score = Score::new(0, &truth, &said, Some(Reference { truth: 1.0, untuned: 5.0, process: Some(2.0) }));
         assert!(score.first && score.confused && !score.wrong_and_sure());
         assert_eq!(score.covered, [("slope_x_rad".into(), true), ("slope_y_rad".into(), false)]);
         assert!((score.closed().unwrap() - 0.95).abs() < 1e-12);
+        assert!((score.closed_by_process().unwrap() - 0.5).abs() < 1e-12);
         let [with, without] = score.closed_from_untuned().unwrap();
         assert!((with - 0.975).abs() < 1e-12 && (without - 0.5).abs() < 1e-12);
     }

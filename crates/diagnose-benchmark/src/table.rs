@@ -217,7 +217,7 @@ const FIGURES: [(&str, &str, &str, Figure); 16] = [
 ];
 
 /// What simple programs reach on the same logs.
-const BASELINES: [(&str, &str, &str, Figure); 6] = [
+const BASELINES: [(&str, &str, &str, Figure); 9] = [
     ("re-tune everything: hidden effect named first", "", "", |s| share(s, in_catalogue, |_| false)),
     ("re-tune everything: gap of the untuned model closed, median", "", "", |s| {
         quantile(from_untuned(s).map(|[_, retuned]| retuned).collect(), 0.5)
@@ -232,6 +232,13 @@ const BASELINES: [(&str, &str, &str, Figure); 6] = [
     ("largest residual names: effect outside the catalogue called unknown", "", "", |s| {
         share(s, |s| s.group == Group::Unknown, |_| false)
     }),
+    ("Gaussian processes of what re-tuning leaves: hidden effect named first", "", "", |s| {
+        share(s, in_catalogue, |_| false)
+    }),
+    ("Gaussian processes: gap closed, held out, relative to the true model: median", "", "", |s| {
+        quantile(closed_by_process(s), 0.5)
+    }),
+    ("the same: 10th percentile", "", "", |s| quantile(closed_by_process(s), 0.1)),
 ];
 
 fn in_catalogue(score: &Score) -> bool {
@@ -240,6 +247,10 @@ fn in_catalogue(score: &Score) -> bool {
 
 fn closed(scores: &[&Score]) -> Vec<f64> {
     scores.iter().filter(|s| in_catalogue(s)).filter_map(|score| score.closed()).collect()
+}
+
+fn closed_by_process(scores: &[&Score]) -> Vec<f64> {
+    scores.iter().filter(|s| in_catalogue(s)).filter_map(|score| score.closed_by_process()).collect()
 }
 
 fn from_untuned(scores: &[&Score]) -> impl Iterator<Item = [f64; 2]> {
@@ -297,14 +308,14 @@ pub fn wilson95(hits: u32, of: u32) -> [f64; 2] {
 pub fn sets_to_csv(scores: &[Score]) -> String {
     let mut text = String::from(
         "set,actions,group,truth,strength,noise,verdict,named,confidence,first,confused,heldout_before,heldout_after,heldout_true,\
-         closed,channel,rollouts,seconds\n",
+         heldout_process,closed,channel,rollouts,seconds\n",
     );
     for s in scores {
         let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
         let heldout = |i: usize| number(s.heldout.map(|h| h[i]));
         let _ = writeln!(
             text,
-            "{},{},{:?},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.1}",
+            "{},{},{:?},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.1}",
             s.set,
             s.actions.name(),
             s.group,
@@ -319,6 +330,7 @@ pub fn sets_to_csv(scores: &[Score]) -> String {
             heldout(0),
             heldout(1),
             heldout(2),
+            number(s.process),
             number(s.closed()),
             s.channel.as_deref().unwrap_or(""),
             s.rollouts,

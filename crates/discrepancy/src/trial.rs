@@ -202,6 +202,12 @@ impl Trial {
         Some(trial)
     }
 
+    /// The tick of a row, the start's being 0.
+    #[must_use]
+    pub fn tick(&self, row: usize) -> usize {
+        self.rows[row].0
+    }
+
     fn block_list(&self) -> Vec<Block> {
         let count = self.rows.len();
         // The first row is where the simulation starts.
