@@ -67,6 +67,8 @@ impl Arm {
 pub struct CombinedRow {
     /// Run.
     pub run: String,
+    /// Its run directory, as in the provenance.
+    pub folder: String,
     /// World; null for our simulated one.
     pub world: Option<String>,
     /// The row.
@@ -120,9 +122,11 @@ pub struct Comparison {
     pub second_only: u32,
     /// Worlds that none solved.
     pub neither: u32,
-    /// Exact McNemar test, two-sided; over several domains with one sign for all worlds of a number, which share their draws. Not corrected for the
-    /// number of comparisons.
+    /// Two-sided: each world's number, whose worlds share their draws in all domains, has the sign of a coin for the sum of its differences (a sign-flip
+    /// test; on a single domain McNemar's exact one). Not corrected for the number of comparisons.
     pub p: f64,
+    /// McNemar's exact test of the counts above, two-sided (McNemar 1947): as if the worlds of several domains were independent.
+    pub mcnemar_p: f64,
 }
 
 impl Comparison {
@@ -240,7 +244,8 @@ fn rows(parts: &[Part]) -> Vec<CombinedRow> {
             Some(published) => published.get(row.method.name()).copied(),
             None => row.published,
         };
-        CombinedRow { run: part.run.clone(), world: part.world(), row: Row { published, ..row.clone() } }
+        let row = Row { published, ..row.clone() };
+        CombinedRow { run: part.run.clone(), folder: part.folder.clone(), world: part.world(), row }
     };
     let shown = |part: &Part, row: &Row| part.methods.contains(&row.method);
     parts.iter().flat_map(|p| p.table.rows.iter().filter(|r| shown(p, r)).map(|r| row(p, r))).collect()
@@ -296,9 +301,12 @@ fn comparisons(plan: &TablePlan, parts: &[Part], arms: &[Arm]) -> Vec<Comparison
             for second in arms[index + 1..].iter().filter(|second| wanted(first, second)) {
                 let cells = domains.iter().map(|domain| cells(parts, domain, first, second));
                 let Some(cells) = cells.reduce(|a, b| Some(a?.plus(b?))).flatten() else { continue };
-                let (domains, first, second, p) = (name.clone(), first.clone(), second.clone(), cells.p());
+                let (domains, first, second) = (name.clone(), first.clone(), second.clone());
+                let (p, mcnemar_p) = (cells.p(), cells.mcnemar_p());
                 let Cells { both, first_only, second_only, neither, .. } = cells;
-                comparisons.push(Comparison { domains, first, second, both, first_only, second_only, neither, p });
+                let comparison =
+                    Comparison { domains, first, second, both, first_only, second_only, neither, p, mcnemar_p };
+                comparisons.push(comparison);
             }
         }
     }

@@ -84,6 +84,12 @@ impl Cells {
     pub(crate) fn p(&self) -> f64 {
         sign_flip(self.nets.values().copied())
     }
+
+    /// McNemar's exact test of the counts, two-sided, whatever worlds share.
+    pub(crate) fn mcnemar_p(&self) -> f64 {
+        let signs = [(self.first_only, -1), (self.second_only, 1)];
+        sign_flip(signs.into_iter().flat_map(|(count, sign)| std::iter::repeat_n(sign, count as usize)))
+    }
 }
 
 /// Every pair of `methods`, in their order, over the worlds that both have played.
@@ -170,7 +176,7 @@ mod tests {
         assert_eq!((both.first_only, both.second_only), (6, 1));
         // Differences of 2, 1, 1, 0, 1 in one direction: 2 / 2^4, where seven worlds would give 2 (1 + 7) / 2^7.
         assert_eq!(both.nets.values().copied().collect::<Vec<_>>(), [-2, -1, -1, 0, -1]);
-        assert!((both.p() - 0.125).abs() < 1e-12);
+        assert!((both.p() - 0.125).abs() < 1e-12 && (both.mcnemar_p() - 0.125).abs() < 1e-12);
         // 2, 1 and -1: |sum| is 2 or more in 6 of 8.
         assert!((sign_flip([2, 1, -1].into_iter()) - 0.75).abs() < 1e-12);
     }

@@ -14,7 +14,7 @@ impl Combined {
         let mut text = String::from(
             "domains,run,method,robot,preset,world,successes,trials,interval95_low,interval95_high,published_successes,\
              published_trials,mean_return,mean_steps_to_goal,mean_depletions,transitions_per_action,mean_large_forces,\
-             mean_out_of_reach,with_obstacle,obstacle_touched,failures\n",
+             mean_out_of_reach,with_obstacle,obstacle_touched,failures,seed,commit,scenario_hash\n",
         );
         for combined in &self.rows {
             let row = &combined.row;
@@ -24,7 +24,7 @@ impl Combined {
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "{},{},{},{},{},{},{},{},{},{},{}",
+                "{},{},{},{},{},{},{},{},{},{},{},{},{}",
                 head(&row.domain, &combined.run, row.method),
                 row.robot,
                 row.preset,
@@ -36,15 +36,21 @@ impl Combined {
                 row.with_obstacle,
                 row.obstacle_touched,
                 failures(&row.failures),
+                self.provenance.common.seed,
+                self.provenance
+                    .runs
+                    .get(&combined.folder)
+                    .map_or(String::from(","), |run| format!("{},{}", run.commit, run.scenario_hash)),
             );
         }
         for total in &self.totals {
             let _ = writeln!(
                 text,
-                "{},,,,{},,,,,,,,,{}",
+                "{},,,,{},,,,,,,,,{},{},,",
                 head(&total.domains, &total.run, total.method),
                 counts(total.successes, total.trials, total.interval95, total.published),
                 failures(&total.failures),
+                self.provenance.common.seed,
             );
         }
         text
@@ -54,12 +60,12 @@ impl Combined {
     #[must_use]
     pub fn comparisons_csv(&self) -> String {
         let mut text = String::from(
-            "domains,first_run,first_method,second_run,second_method,both,first_only,second_only,neither,mcnemar_p\n",
+            "domains,first_run,first_method,second_run,second_method,both,first_only,second_only,neither,p,mcnemar_p\n",
         );
         for c in &self.comparisons {
             let (first, second) = (head(&c.domains, &c.first.run, c.first.method), c.second.method.name());
             let counts = [c.both, c.first_only, c.second_only, c.neither].map(|count| count.to_string()).join(",");
-            let _ = writeln!(text, "{first},{},{second},{counts},{}", c.second.run, c.p);
+            let _ = writeln!(text, "{first},{},{second},{counts},{},{}", c.second.run, c.p, c.mcnemar_p);
         }
         text
     }

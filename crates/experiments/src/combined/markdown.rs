@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use scenario::Published;
 
-use super::{Arm, Combined};
+use super::{Arm, Combined, Comparison};
 use crate::paired::probability;
 
 impl Combined {
@@ -104,9 +104,11 @@ impl Combined {
         if self.comparisons.is_empty() {
             return;
         }
-        *text += "\nThe same worlds: how many only the first method solved, how many only the second, and the two-sided p of McNemar's exact \
-                  test, not corrected for the number of comparisons. Worlds of the same number share their draws in all domains: over several \
-                  of them each number has one sign, and intervals of sums, which take them for independent, are a little narrow.\n\n";
+        *text += "\nThe same worlds: how many only the first method solved, how many only the second, and a two-sided p, not corrected for the \
+                  number of comparisons. On one domain it is that of McNemar's exact test. Worlds of the same number share their draws in all \
+                  domains: over several of them the differences of each number get one random sign (a sign-flip test), and what McNemar's test of \
+                  the counts would say, as if all were independent, is in brackets. Intervals of sums take them for independent and are a \
+                  little narrow.\n\n";
         let (mut columns, mut pairs): (Vec<&str>, Vec<(&Arm, &Arm)>) = (Vec::new(), Vec::new());
         for comparison in &self.comparisons {
             if !columns.contains(&comparison.domains.as_str()) {
@@ -120,7 +122,7 @@ impl Combined {
         for pair in pairs {
             let cell = |column: &&str| {
                 let found = self.comparisons.iter().find(|c| c.arms() == pair && c.domains == *column);
-                found.map_or("–".into(), |c| format!("{} : {}, p {}", c.first_only, c.second_only, probability(c.p)))
+                found.map_or("–".into(), |c| format!("{} : {}, p {}", c.first_only, c.second_only, p_values(c)))
             };
             let cells: Vec<String> = columns.iter().map(cell).collect();
             let _ = writeln!(text, "| {} | {} | {} |", pair.0.label(), pair.1.label(), cells.join(" | "));
@@ -160,4 +162,10 @@ fn rate(successes: u32, trials: u32, interval95: [f64; 2], published: Option<Pub
     let [low, high] = interval95;
     let published = published.map_or(String::new(), |p| format!(" [{}/{}]", p.successes, p.trials));
     format!("{successes}/{trials} ({low:.2}–{high:.2}){published}")
+}
+
+/// Of a comparison: with one sign for each world number, and in brackets McNemar's where that is another.
+fn p_values(comparison: &Comparison) -> String {
+    let [p, mcnemar] = [comparison.p, comparison.mcnemar_p].map(probability);
+    if p == mcnemar { p } else { format!("{p} ({mcnemar})") }
 }

@@ -124,13 +124,15 @@ fn comparisons(combined: &Combined) -> String {
                 c.first_only.to_string(),
                 c.second_only.to_string(),
                 p_value(c.p),
+                p_value(c.mcnemar_p),
             ]
         })
         .collect();
     if rows.is_empty() {
         return String::new();
     }
-    let heads = ["on the same worlds", "the first alone", "the second alone", "McNemar p"];
+    let heads =
+        ["on the same worlds", "the first alone", "the second alone", "p (each world number one sign)", "McNemar p"];
     format!("<details><summary>Comparisons on the same worlds</summary>{}</details>\n", table(&heads, &rows))
 }
 
