@@ -2,6 +2,7 @@
 
 pub mod slurm;
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -11,6 +12,11 @@ use std::sync::OnceLock;
 pub fn root() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.parent().unwrap_or(package).to_path_buf()
+}
+
+/// Tells why a test does nothing, past the harness, which shows no output of tests that pass.
+pub fn skipped(reason: &str) {
+    let _ = writeln!(std::io::stderr(), "skipped: {reason}");
 }
 
 /// A release program, built from this checkout if need be, set to run at its root. All programs are built together, as `xtask` does, and

@@ -1,12 +1,11 @@
 //! Shards on engines: the same bytes as a local run, whoever is killed, and whenever.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use end_to_end::slurm::{OneNode, signal, workers};
-use end_to_end::{files, program, run, stderr};
+use end_to_end::{files, program, run, skipped, stderr};
 use tempfile::TempDir;
 
 const DATA: &str = "--transitions 48000 --shards 12";
@@ -76,11 +75,6 @@ fn same(folder: &Path, expected: &[(PathBuf, String)], what: &str) {
     for (one, other) in found.iter().zip(expected) {
         assert!(one.1 == other.1, "{what}: {} differs", one.0.display());
     }
-}
-
-/// Tells why a test does nothing, past the harness, which shows no output of tests that pass.
-fn skipped(reason: &str) {
-    let _ = writeln!(std::io::stderr(), "skipped: {reason}");
 }
 
 /// Waits as long as a busy machine may need: only what never happens ends a test.

@@ -1,10 +1,9 @@
 //! Where output cannot go: closed pipes, full disks, folders that nobody may write.
 
 use std::fs::OpenOptions;
-use std::io::Write as _;
 use std::process::{Command, Output, Stdio};
 
-use end_to_end::{program, stderr};
+use end_to_end::{program, skipped, stderr};
 
 use crate::pipeline::trained;
 
@@ -105,7 +104,7 @@ fn on_a_full_disk_programs_stop_with_a_sentence_and_go_on_when_there_is_room() {
         command
     };
     if !shell(&mount("64k")).output().is_ok_and(|output| output.status.success()) {
-        let _ = writeln!(std::io::stderr(), "skipped: a small disk cannot be mounted here");
+        skipped("a small disk cannot be mounted here");
         return;
     }
     for (binary, arguments) in writers() {

@@ -1,10 +1,9 @@
 //! Pages in a real browser, where there is one: what it makes of them has all parts, and is drawn.
 
-use std::io::Write as _;
 use std::path::Path;
 use std::process::Command;
 
-use end_to_end::{program, root, stderr};
+use end_to_end::{program, root, skipped, stderr};
 
 /// Debian's name and that of others.
 const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
@@ -14,8 +13,7 @@ fn browser() -> Option<&'static str> {
     let answers = |name: &&&str| Command::new(name).arg("--version").output().is_ok_and(|o| o.status.success());
     let found = BROWSERS.iter().find(answers).copied();
     if found.is_none() {
-        // Past the harness, which shows no output of tests that pass.
-        let _ = writeln!(std::io::stderr(), "skipped: none of {} is installed", BROWSERS.join(", "));
+        skipped(&format!("none of {} is installed", BROWSERS.join(", ")));
     }
     found
 }

@@ -1,11 +1,10 @@
 //! `eval --world`: trials in a world that is another program.
 
-use std::io::Write as _;
 use std::path::Path;
 use std::process::{Output, Stdio};
 use std::time::Duration;
 
-use end_to_end::{files, program, stderr};
+use end_to_end::{files, program, skipped, stderr};
 use serde_json::Value;
 
 const TASK: &str = "--domain obstacle --robot jaco --quick --set task.horizon=20 --set planner.budget={transitions=100} --set belief.rejection.particles=30 \
@@ -26,8 +25,7 @@ fn misbehaving(mode: &str) -> String {
 fn python_missing() -> bool {
     let missing = !std::process::Command::new("python3").arg("--version").output().is_ok_and(|o| o.status.success());
     if missing {
-        // Past the harness, which shows no output of tests that pass.
-        let _ = writeln!(std::io::stderr(), "skipped: there is no python3");
+        skipped("there is no python3");
     }
     missing
 }
