@@ -78,7 +78,7 @@ fn the_pages_of_runs_and_episodes_are_whole_in_a_browser() {
     report(&root().join("assets/results"), "all.html");
     let figures = std::fs::read_to_string(page("all.html")).unwrap().matches("<figure").count();
     assert!(figures >= 5, "{figures}");
-    check(browser, &page("all.html"), &["ablation", "table1", "table2"], figures);
+    check(browser, &page("all.html"), &["table1", "table2", "ablation"], figures);
 
     let demo = program("demo").args(["--domain", "D4", "--quick", "--out"]).arg(page("demo")).output().unwrap();
     assert!(demo.status.success(), "{}", stderr(&demo));

@@ -186,6 +186,8 @@ pub struct Sources {
 pub struct Combined {
     /// For people.
     pub title: String,
+    /// Tables stand in this order.
+    pub order: u32,
     /// One row an arm and domain.
     pub rows: Vec<CombinedRow>,
     /// Sums over domains.
@@ -205,6 +207,7 @@ impl Combined {
         let runs = parts.iter().map(|part| (part.folder.clone(), source(part))).collect();
         Self {
             title: plan.title.clone(),
+            order: plan.order,
             totals,
             comparisons: comparisons(plan, parts, &arms(&rows)),
             rows,

@@ -13,7 +13,10 @@ pub fn wilson95(successes: u32, trials: u32) -> [f64; 2] {
     let scale = 1.0 + z * z / n;
     let center = (p + z * z / (2.0 * n)) / scale;
     let half = z / scale * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-    [(center - half).max(0.0), (center + half).min(1.0)]
+    // At the ends the formula gives 0 and 1 up to rounding.
+    let low = if successes == 0 { 0.0 } else { (center - half).max(0.0) };
+    let high = if successes >= trials { 1.0 } else { (center + half).min(1.0) };
+    [low, high]
 }
 
 #[cfg(test)]
@@ -30,5 +33,8 @@ mod tests {
             assert!((a - low).abs() < 5e-5 && (b - high).abs() < 5e-5, "{successes}/{trials}: [{a}, {b}]");
         }
         assert_eq!(wilson95(0, 0), [0.0, 1.0]);
+        for trials in 1..200 {
+            assert_eq!((wilson95(0, trials)[0], wilson95(trials, trials)[1]), (0.0, 1.0));
+        }
     }
 }

@@ -74,7 +74,7 @@ fn success(combined: &Combined) -> Figure {
     Figure { title, panels, columns, panel_size_px, colors }
 }
 
-/// Each method by domain: the paper's figure 4, with all that the paper published as open markers.
+/// Each method by domain: the paper's figure 4, with what the paper published of the run's own methods as open markers.
 fn success_of_run(combined: &Combined, run: &str, domains: &[String]) -> Panel {
     let values = |arm: &Arm, of: fn(&Row) -> Estimate| -> Vec<Estimate> {
         let row = |domain: &String| combined.row(arm, domain).map_or_else(Estimate::missing, |r| of(&r.row));
@@ -89,14 +89,8 @@ fn success_of_run(combined: &Combined, run: &str, domains: &[String]) -> Panel {
             || Estimates { name: format!("{name}, published"), values, mark: Mark::Open, like: name.into() };
         known.then(published)
     };
-    let (own, others): (Vec<Arm>, Vec<Arm>) = combined.arms().into_iter().partition(|arm| arm.run == run);
-    let mut series: Vec<Estimates> = own.iter().flat_map(|arm| std::iter::once(ours(arm)).chain(theirs(arm))).collect();
-    // What the paper reached with a method that this run lacks.
-    for published in others.iter().filter_map(theirs) {
-        if !series.iter().any(|other| other.name == published.name) {
-            series.push(published);
-        }
-    }
+    let own: Vec<Arm> = combined.arms().into_iter().filter(|arm| arm.run == run).collect();
+    let series: Vec<Estimates> = own.iter().flat_map(|arm| std::iter::once(ours(arm)).chain(theirs(arm))).collect();
     let dots = Dots {
         categories: domains.to_vec(),
         value: Axis { limits: Some((0.0, 1.0)), ..Axis::new("success rate") },

@@ -9,6 +9,14 @@ pub enum Error {
     /// A picture that cannot be drawn.
     #[error(transparent)]
     Figure(#[from] figures::Error),
+    /// A combined table that this version does not understand.
+    #[error("{}: expected a table of this version's `eval --all`, and found one of another ({source}): make it anew with --keep-finished", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong in it.
+        source: serde_json::Error,
+    },
     /// A folder that holds neither a run nor an episode.
     #[error(
         "{}: expected a run of `eval` (run.json), of `eval --all` (all.json) or an episode of `demo` (trace.json)",

@@ -46,7 +46,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     } else if folder.join("run.json").is_file() {
         run_page(&Archive::read(folder)?)?
     } else {
-        let suite = Suite::read(folder);
+        let suite = Suite::read(folder)?;
         if suite.is_empty() {
             return Err(Error::NoRun { path: folder.clone() }.into());
         }

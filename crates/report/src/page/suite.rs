@@ -5,6 +5,7 @@ use std::path::Path;
 use experiments::{Combined, CombinedRow};
 
 use super::{escape, fixed, p_value, page, percent, picture, section, table};
+use crate::Error;
 
 /// Combined tables with their pictures.
 #[derive(Clone, Debug, Default)]
@@ -17,9 +18,12 @@ pub struct Suite {
 type Picture = (String, String);
 
 impl Suite {
-    /// The tables in a folder of `eval --all`; none where it holds none. What is no table is left alone.
-    #[must_use]
-    pub fn read(folder: &Path) -> Self {
+    /// The tables in a folder of `eval --all`, in their order; none where it holds none. What is no table is left alone.
+    ///
+    /// # Errors
+    ///
+    /// On a table in the format of another version: left out, it would not be missed.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
         let mut names: Vec<String> = std::fs::read_dir(folder)
             .into_iter()
             .flatten()
@@ -34,10 +38,15 @@ impl Suite {
         let mut tables: Vec<(String, Combined, Vec<Picture>)> = Vec::new();
         for name in names.iter().filter_map(|name| name.strip_suffix(".json")) {
             let text = std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap_or_default();
-            if let Ok(combined) = serde_json::from_str::<Combined>(&text) {
-                tables.push((name.to_owned(), combined, Vec::new()));
+            match serde_json::from_str::<Combined>(&text) {
+                Ok(combined) => tables.push((name.to_owned(), combined, Vec::new())),
+                Err(source) if is_some_table(&text) => {
+                    return Err(Error::Table { path: folder.join(format!("{name}.json")), source });
+                }
+                Err(_) => {}
             }
         }
+        tables.sort_by_key(|(_, combined, _)| combined.order);
         for (file, svg) in pictures {
             // Named after the table, but for figure 4 of the paper, which shows the first.
             let belongs = |name: &str| {
@@ -51,7 +60,7 @@ impl Suite {
                 list.insert(at, (file, svg));
             }
         }
-        Self { tables }
+        Ok(Self { tables })
     }
 
     /// Whether there is none.
@@ -59,6 +68,12 @@ impl Suite {
     pub fn is_empty(&self) -> bool {
         self.tables.is_empty()
     }
+}
+
+/// Whether a file is meant as a combined table, of whatever version.
+fn is_some_table(text: &str) -> bool {
+    let value: serde_json::Value = serde_json::from_str(text).unwrap_or_default();
+    ["rows", "comparisons", "provenance"].iter().all(|key| value.get(key).is_some())
 }
 
 /// A page about all tables.

@@ -54,11 +54,22 @@ fn a_run_and_an_episode_have_their_parts() {
     assert_eq!(html.matches("class=\"won\"").count() + html.matches("class=\"lost\"").count(), run.trials.len());
     let mixture = run.table.rows.iter().find(|row| row.method == agent::Method::Mixture).unwrap();
     assert!(html.contains(&format!("<b>{} of {}</b>", mixture.successes, mixture.trials)));
-    let suite = Suite::read(&root.join("assets/results"));
+    let suite = Suite::read(&root.join("assets/results")).unwrap();
     assert!(!suite.is_empty());
     let html = suite_page(&suite);
     check_structure(&html);
-    assert!(html.contains("id=\"table1\"") && html.contains("id=\"table2\""));
+    let places = ["table1", "table2", "ablation"].map(|name| html.find(&format!("id=\"{name}\"")).unwrap());
+    assert!(places.is_sorted(), "in the order of their plans");
+}
+
+#[test]
+fn a_table_of_another_version_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("other.json"), "{\"rows\": 3}").unwrap();
+    assert!(Suite::read(folder.path()).unwrap().is_empty(), "no table");
+    std::fs::write(folder.path().join("old.json"), "{\"rows\": [], \"comparisons\": [], \"provenance\": {}}").unwrap();
+    let error = Suite::read(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("old.json") && error.contains("missing field"), "{error}");
 }
 
 #[test]
