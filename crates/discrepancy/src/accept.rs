@@ -16,8 +16,10 @@ const SAME_SIGN: f64 = 0.95;
 pub(crate) const NEGLIGIBLE: f64 = 0.01;
 /// By chance an effect that no held-out episode shows may explain them worse by this much in ln p.
 const HELDOUT_SLACK: f64 = 1.0;
-/// The same as a share of the gain: the place of an obstacle is not known exactly.
+/// The same as a share of the gain: the place of a patch is not known exactly.
 const HELDOUT_SHARE: f64 = 0.02;
+/// The same of a body in the way: what meets it goes another way a millimetre beside its place.
+const HELDOUT_SHARE_OF_BODIES: f64 = 0.1;
 
 /// Standard errors by which the gain of all episodes has to be above 0 where it has to be steady.
 const STEADY: f64 = 2.5;
@@ -112,7 +114,9 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
     };
     let gains = [of_episodes(&fitted, &episodes.fitted), of_episodes(&heldout, &episodes.heldout)].concat();
     let most = gains.iter().copied().fold(0.0, f64::max);
-    let slack = HELDOUT_SLACK.max(HELDOUT_SHARE * rival.gain);
+    let body = rival.fit.model.parts.last().is_some_and(|part| part.begin.is_some());
+    let share = if body { HELDOUT_SHARE_OF_BODIES } else { HELDOUT_SHARE };
+    let slack = HELDOUT_SLACK.max(share * rival.gain);
     // What the fitted episodes gained the held-out ones should, too.
     let expected = fitted.iter().sum::<f64>() * episodes.heldout.len() as f64 / episodes.fitted.len().max(1) as f64;
     let kept = !asked.kept || heldout.iter().sum::<f64>() > KEPT * expected;

@@ -92,6 +92,16 @@ fn weight_n(part: &Study, z: &[f64]) -> f64 {
     nominal.object(z, 0.0, &part.engine).mass_kg * nominal.header().gravity_mps2
 }
 
+/// Anisotropies that are tried along every axis.
+const AMPLITUDES: [f64; 2] = [0.04, 0.1];
+
+/// Coordinates that were simulated.
+struct Place {
+    cost: f64,
+    x: Vec<f64>,
+    raw: Vec<Vec<f64>>,
+}
+
 /// The linear step of the screening as far as it helps: large effects are not linear.
 pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
     let at = |share: f64| -> Vec<f64> {
@@ -100,24 +110,33 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     };
     let promised = promise.gain * part.chosen.len() as f64 / promise.episodes as f64;
     let before = base.cost();
-    let mut best: Option<(f64, Vec<f64>, Vec<Vec<f64>>)> = None;
+    let simulated = |x: Vec<f64>| -> Place {
+        let raw = part.raw(&model.hypothesis(&x));
+        Place { cost: cost(&x, &part.white(&raw, model.engine_errors(&x))), x, raw }
+    };
+    let good = |place: &Place| before - place.cost > 0.5 * promised;
+    let mut tried: Vec<Place> = Vec::new();
     // From a border, where a strength may have no more effect, a fit does not find back.
     let at_border = (promise.begin.iter().zip(&promise.candidate.coordinates))
         .any(|(a, coordinate)| coordinate.strength && *a != 0.0 && coordinate.range.contains(a));
     let whole = if at_border { 0.5 } else { 1.0 };
     for share in [whole, 0.4 * whole, 0.1 * whole] {
-        let x = at(share);
-        let raw = part.raw(&model.hypothesis(&x));
-        let cost = cost(&x, &part.white(&raw, model.engine_errors(&x)));
-        let good = before - cost > 0.5 * promised;
-        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-            best = Some((cost, x, raw));
-        }
-        if promise.candidate.begin.is_some() || (good && share < whole) {
+        tried.push(simulated(at(share)));
+        if promise.candidate.begin.is_some() || (share < whole && tried.last().is_some_and(good)) {
             break;
         }
     }
-    let (_, x, raw) = best.unwrap_or_else(|| (0.0, at(0.0), base.raw.clone()));
+    if promise.candidate.kind() == EffectKind::AnisotropicFriction && !tried.iter().any(good) {
+        // What a round object, which slips off its tool, does is no multiple of what a slight anisotropy does, and every axis has its own valley.
+        for (amplitude, eighth) in
+            AMPLITUDES.iter().flat_map(|amplitude| (0..8).map(move |eighth| (*amplitude, eighth)))
+        {
+            let own = promise.candidate.coordinates_of(&[amplitude, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
+            tried.push(simulated(base.x.iter().copied().chain(own).collect()));
+        }
+    }
+    let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Place { x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
     Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() }
 }
 

@@ -22,6 +22,8 @@ const SOFT: f64 = 0.5;
 const PATCHES: usize = 6;
 /// Standard deviation of where something is, m, around the place that a fit begins from.
 const PLACE_M: f64 = 0.05;
+/// The same of a body in the way, which is seen to within a few millimetres; its radius is known twice as well.
+const OBSTACLE_M: f64 = 0.01;
 
 /// What is known of the log before any effect is tried.
 #[derive(Clone, Debug)]
@@ -83,6 +85,19 @@ impl Candidate {
     #[must_use]
     pub fn kind(&self) -> EffectKind {
         self.base.kind()
+    }
+
+    /// Kind of the effect, and whether it moves: a body in the way that does is another model than one that does not.
+    #[must_use]
+    pub fn variant(&self) -> (EffectKind, bool) {
+        let moves = matches!(&self.base, EffectConfig::HiddenObstacle(obstacle) if obstacle.movable);
+        (self.kind(), moves)
+    }
+
+    /// Whether a log may have several of its kind, each at a place of its own.
+    #[must_use]
+    pub fn tied_to_a_place(&self) -> bool {
+        matches!(self.kind(), EffectKind::FrictionPatch | EffectKind::HiddenObstacle)
     }
 
     /// The effect at coordinates `a`, one for each of [`Self::coordinates`]; they are held within their ranges.
@@ -172,7 +187,9 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         EffectKind::StribeckFriction => [0.02, 0.06].iter().map(|v| with(&[(1, *v)])).collect(),
         EffectKind::HiddenObstacle => obstacles(context),
         // What a bounce or a soft contact changes is no multiple of what a slight one or a stiffer one does.
-        EffectKind::Restitution => [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect(),
+        EffectKind::Restitution | EffectKind::Adhesion => {
+            [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
+        }
         EffectKind::ContactCompliance => {
             let near = with(&[]);
             let soft = with(&[(0, SOFT * neutral.values()[0])]);
@@ -203,9 +220,9 @@ fn obstacles(context: &Context) -> Vec<Candidate> {
                 strength: index == 3,
             };
             let mut coordinates = vec![
-                unit(0, 0.03, [-4.0, 4.0]),
-                unit(1, 0.03, [-4.0, 4.0]),
-                unit(3, 0.015, [(0.01 - radius_m) / 0.015, 4.0]),
+                unit(0, OBSTACLE_M, [-5.0, 5.0]),
+                unit(1, OBSTACLE_M, [-5.0, 5.0]),
+                unit(3, 0.5 * OBSTACLE_M, [(0.01 - radius_m) / (0.5 * OBSTACLE_M), 5.0]),
             ];
             if choice.movable {
                 coordinates.push(unit(6, 0.6, [-1.5, 6.0]));

@@ -84,5 +84,5 @@ fn placed(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> (Vec<Place
         object_m: object.shape.footprint_radius_m(object.size_m),
         tool_m: simulator.nominal.header().tool_radius_m.unwrap_or(0.0),
     };
-    (obstacle::places(&courses, outlines, OBSTACLES), patch::places(&courses, PATCHES))
+    (obstacle::places(&courses, outlines, OBSTACLES), patch::places(&courses, outlines, PATCHES))
 }

@@ -12,6 +12,10 @@ use crate::trial::{Happened, Trial};
 const GRID_M: f64 = 0.01;
 /// Radii of what is looked for, m.
 const RADII_M: [f64; 5] = [0.012, 0.018, 0.025, 0.033, 0.042];
+/// Least and largest radius, m.
+const RANGE_M: [f64; 2] = [0.01, 0.06];
+/// Steps, m, by which a circle on the grid is moved and grown.
+const FINER_M: [f64; 3] = [0.005, 0.0025, 0.00125];
 /// Rows that are averaged.
 const ROWS: usize = 8;
 /// How far, m, an object has to be off its simulated path.
@@ -73,6 +77,16 @@ impl Outlines {
         }
     }
 
+    /// Corners, or four points of the rim, as seen from above, m: what the object stands on.
+    pub(crate) fn feet(&self, row: &Happened) -> [[f64; 2]; 4] {
+        let (sin, cos) = row.yaw_rad.sin_cos();
+        let feet = match self.sides_m {
+            Some([a, b]) => [[a, b], [a, -b], [-a, b], [-a, -b]],
+            None => [[self.object_m, 0.0], [-self.object_m, 0.0], [0.0, self.object_m], [0.0, -self.object_m]],
+        };
+        feet.map(|[x, y]| [row.object[0] + cos * x - sin * y, row.object[1] + sin * x + cos * y])
+    }
+
     /// Distance, m, of a point from the tool.
     fn off_tool(&self, point: [f64; 2], row: &Happened) -> f64 {
         row.tool.map_or(f64::INFINITY, |tool| distance(point, tool) - self.tool_m)
@@ -96,7 +110,9 @@ fn most_voted(witnesses: &[Witness], outlines: Outlines, count: usize) -> Vec<Pl
     let Some((low, high)) = corners(pushed, around) else { return Vec::new() };
     let votes = |place, radius_m| witnesses.iter().map(|witness| witness.vote(place, radius_m, outlines)).sum::<f64>();
     let near = |a: &Place, b: &Place| (a.1 - b.1).abs() < WIDER_M && distance(a.0, b.0) < APART_M;
-    best_places((low, high), GRID_M, &RADII_M, votes, near, count)
+    let places = best_places((low, high), GRID_M, &RADII_M, votes, near, count);
+    let same = |a: &Place, b: &Place| (a.1 - b.1).abs() < 0.5 * WIDER_M && distance(a.0, b.0) < WIDER_M;
+    finer_places(places, &FINER_M, RANGE_M, votes, same)
 }
 
 /// Of circles on a grid between two corners those with the highest scores above 0, at most `count`, none near a better one.
@@ -128,6 +144,43 @@ pub(crate) fn best_places(
         }
     }
     chosen
+}
+
+/// Circles moved and grown by steps, larger ones first, to where their scores are highest nearby; the best first, none the same as a better one.
+pub(crate) fn finer_places(
+    places: Vec<Place>,
+    steps_m: &[f64],
+    radii_m: [f64; 2],
+    score: impl Fn([f64; 2], f64) -> f64,
+    same: impl Fn(&Place, &Place) -> bool,
+) -> Vec<Place> {
+    let move_to_best = |mut place: Place| {
+        let mut most = score(place.0, place.1);
+        for step_m in steps_m {
+            loop {
+                let ([x, y], radius_m) = place;
+                let moves =
+                    (0..27).map(|code| [code % 3, code / 3 % 3, code / 9].map(|n| step_m * (f64::from(n) - 1.0)));
+                let around = moves.map(|[dx, dy, dr]| ([x + dx, y + dy], radius_m + dr));
+                let within = around.filter(|place| (radii_m[0]..=radii_m[1]).contains(&place.1));
+                let best = within.map(|place| (score(place.0, place.1), place)).max_by(|a, b| a.0.total_cmp(&b.0));
+                match best {
+                    Some((better, next)) if better > most => (most, place) = (better, next),
+                    _ => break,
+                }
+            }
+        }
+        (most, place)
+    };
+    let mut moved: Vec<(f64, Place)> = places.into_iter().map(move_to_best).collect();
+    moved.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut kept: Vec<Place> = Vec::new();
+    for (_, place) in moved {
+        if !kept.iter().any(|other| same(other, &place)) {
+            kept.push(place);
+        }
+    }
+    kept
 }
 
 fn witness(rows: &[Happened], outlines: Outlines) -> Witness {
@@ -249,7 +302,7 @@ mod tests {
         let body = ([0.02, -0.01], 0.025);
         let pushes = [0.0, 1.1, 2.5, 4.0].map(|yaw| witness(&push(yaw, body.0, Some(body)), OUTLINES));
         let (place, radius_m) = most_voted(&pushes, OUTLINES, 3)[0];
-        assert!(distance(place, body.0) < 0.01 && (radius_m - body.1).abs() < 0.01, "{place:?} {radius_m}");
+        assert!(distance(place, body.0) < 0.003 && (radius_m - body.1).abs() < 0.003, "{place:?} {radius_m}");
         assert!(pushes.iter().all(|push| push.vote(body.0, body.1, OUTLINES) > 0.8));
         let passing = witness(&push(0.5, body.0, None), OUTLINES);
         assert!(passing.event.is_none());

@@ -162,11 +162,13 @@ impl Report {
         let fitted = diagnosis.pieces.iter().map(of_models);
         let everywhere = diagnosis.model.model.parts.iter().any(|part| part.begin.is_none());
         // Of what was fitted, where the gap is plain: a cause that few episodes meet need not show in those held out.
+        let chance = diagnosis.remaining.iter().map(|cell| cell.p_value).fold(1.0, f64::min);
+        // Odd episodes that nothing explains are no gap: it has to stand out, or to be left in what was held out.
+        let shows = chance < settings.another || closed_fraction < NEARLY_CLOSED;
         let beside_it = everywhere
             && ((before > settings.gap && typical_closing(heldout, settings.gap) < HALF)
-                || typical_closing(fitted, settings.unexplained) < HALF);
+                || (shows && typical_closing(fitted, settings.unexplained) < HALF));
         let odd = effects.is_empty() && diagnosis.heldout_episodes.iter().any(|(_, _, after)| *after > settings.odd);
-        let chance = diagnosis.remaining.iter().map(|cell| cell.p_value).fold(1.0, f64::min);
         let unexplained = beside_it || odd || is_left(left, chance, closed_fraction, settings);
         let verdict = match (unexplained, effects.is_empty()) {
             (true, _) => Verdict::Unknown,

@@ -56,3 +56,41 @@ impl Round {
 pub(crate) fn sort(rivals: &mut [Rival]) {
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
 }
+
+/// Keeps the first of each key.
+pub(crate) fn first_of_each<T, K: PartialEq>(list: &mut Vec<T>, key: impl Fn(&T) -> K) {
+    let mut keys = Vec::new();
+    list.retain(|item| {
+        let key = key(item);
+        let first = !keys.contains(&key);
+        keys.push(key);
+        first
+    });
+}
+
+/// Keeps those with one of the first `count` keys.
+pub(crate) fn of_first<T, K: PartialEq>(list: &mut Vec<T>, count: usize, key: impl Fn(&T) -> K) {
+    let mut keys = Vec::new();
+    list.retain(|item| {
+        let key = key(item);
+        if keys.len() < count && !keys.contains(&key) {
+            keys.push(key);
+            return true;
+        }
+        keys.contains(&key)
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variants_of_a_kind_count_once() {
+        let mut list = vec!["a1", "b1", "a2", "c1", "b2", "a1"];
+        of_first(&mut list, 2, |item| item.chars().next());
+        assert_eq!(list, ["a1", "b1", "a2", "b2", "a1"]);
+        first_of_each(&mut list, |item| *item);
+        assert_eq!(list, ["a1", "b1", "a2", "b2"]);
+    }
+}

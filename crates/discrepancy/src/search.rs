@@ -11,7 +11,7 @@ use crate::fit::{Begin, Effort, Fit, STEPS, cost, fit};
 use crate::likelihood::{mean_square, trimmed_mean};
 use crate::locate::{Cell, locate};
 use crate::model::Model;
-use crate::rival::{Rival, Round, sort};
+use crate::rival::{Rival, Round, first_of_each, of_first, sort};
 use crate::screen::{Promise, Screening, shortlist};
 use crate::study::Study;
 
@@ -229,11 +229,15 @@ impl Search<'_> {
         let first = base.model.parts.is_empty();
         let part = if first { self.part.clone() } else { self.study.part(&screening.places) };
         let begin = if first { base.clone() } else { base.part(&screening.places) };
-        let promises = screening.promises(&part, &begin, self.study.chosen.len());
+        let mut promises = screening.promises(&part, &begin, self.study.chosen.len());
+        // What is there already is fitted with it; a second patch or body is another one.
+        let there: Vec<EffectKind> = begin.model.parts.iter().map(Candidate::kind).collect();
+        promises.retain(|promise| promise.candidate.tied_to_a_place() || !there.contains(&promise.candidate.kind()));
         let mut quick = self.quick(screening, &part, &begin, &promises);
         let before = begin.log_evidence();
         let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
-        quick.truncate(self.settings.fits);
+        of_first(&mut quick, self.settings.fits, added_kind);
+        let first_kind = quick.first().and_then(added_kind);
         let lead = quick.first().map_or(0.0, Fit::log_evidence);
         let without = base.log_evidence();
         let share = self.share(screening);
@@ -263,7 +267,9 @@ impl Search<'_> {
                 // Those far behind need no exact optimum: what they gain in the episodes of the screening they gain in all.
                 let gain = quick.log_evidence();
                 let affordable = !alone && self.study.simulator.rollouts() < self.settings.rollouts;
-                if rank == 0 || (lead - gain < NEAR && affordable) {
+                // Whether a body in the way moves is seen where it is met, which may be in few episodes.
+                let near = lead - gain < NEAR || added_kind(&quick) == first_kind;
+                if rank == 0 || (near && affordable) {
                     fully(quick)
                 } else {
                     Rival { heldout: self.heldout(&quick), fit: quick, gain: share * (gain - before), whole: false }
@@ -292,6 +298,7 @@ impl Search<'_> {
                 _ => break,
             }
         }
+        first_of_each(&mut rivals, Rival::kind);
         let mut round = Round { promises, rivals, before: self.heldout(&base), base, hasty };
         self.tune(&mut round);
         round
@@ -393,15 +400,14 @@ impl Search<'_> {
             sort(&mut quick);
         }
         // Of one kind's several places the best.
-        let mut kinds = Vec::new();
-        quick.retain(|fit| {
-            let kind = fit.model.parts.last().map(Candidate::kind);
-            let first = !kinds.contains(&kind);
-            kinds.push(kind);
-            first
-        });
+        first_of_each(&mut quick, |fit| fit.model.parts.last().map(Candidate::variant));
         quick
     }
+}
+
+/// Kind of a fit's last effect.
+fn added_kind(fit: &Fit) -> Option<EffectKind> {
+    fit.model.parts.last().map(Candidate::kind)
 }
 
 /// Whether a fit leaves more than noise in most episodes.
