@@ -303,8 +303,10 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
     let names = names.join(" and ");
     match verdict {
         Verdict::Effect => {
+            // What few episodes meet may leave the others as they were, or hit one of them harder.
+            let goes = if after < before { "falls" } else { "goes" };
             format!(
-                "The model lacks {names}: with it the held-out error falls from {before:.2} to {after:.2} (1 is noise)."
+                "The model lacks {names}: with it the held-out error {goes} from {before:.2} to {after:.2} (1 is noise)."
             )
         }
         Verdict::None => {
