@@ -92,9 +92,6 @@ fn weight_n(part: &Study, z: &[f64]) -> f64 {
     nominal.object(z, 0.0, &part.engine).mass_kg * nominal.header().gravity_mps2
 }
 
-/// Anisotropies that are tried along every axis.
-const AMPLITUDES: [f64; 2] = [0.04, 0.1];
-
 /// Coordinates that were simulated.
 struct Place {
     cost: f64,
@@ -126,14 +123,9 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
             break;
         }
     }
-    if promise.candidate.kind() == EffectKind::AnisotropicFriction && !tried.iter().any(good) {
-        // What a round object, which slips off its tool, does is no multiple of what a slight anisotropy does, and every axis has its own valley.
-        for (amplitude, eighth) in
-            AMPLITUDES.iter().flat_map(|amplitude| (0..8).map(move |eighth| (*amplitude, eighth)))
-        {
-            let own = promise.candidate.coordinates_of(&[amplitude, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
-            tried.push(simulated(base.x.iter().copied().chain(own).collect()));
-        }
+    if !tried.iter().any(good) {
+        let elsewhere = promise.candidate.elsewhere().into_iter();
+        tried.extend(elsewhere.map(|own| simulated(base.x.iter().copied().chain(own).collect())));
     }
     let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     let Place { x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));

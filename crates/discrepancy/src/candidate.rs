@@ -18,6 +18,8 @@ const REACH: f64 = 0.35;
 const FAR: f64 = 1.2;
 /// Natural frequency of a soft contact, in that of the model's.
 const SOFT: f64 = 0.5;
+/// Anisotropies that are tried along every axis.
+const AMPLITUDES: [f64; 2] = [0.04, 0.1];
 /// Places of a patch that are tried.
 const PATCHES: usize = 6;
 /// Standard deviation of where something is, m, around the place that a fit begins from.
@@ -124,6 +126,17 @@ impl Candidate {
             a.clamp(c.range[0], c.range[1])
         };
         self.coordinates.iter().map(coordinate).collect()
+    }
+
+    /// Coordinates to begin from where a linear step leads nowhere.
+    #[must_use]
+    pub fn elsewhere(&self) -> Vec<Vec<f64>> {
+        if self.kind() != EffectKind::AnisotropicFriction {
+            return Vec::new();
+        }
+        // What a round object, which slips off its tool, does is no multiple of what a slight anisotropy does, and every axis has its own valley.
+        let axes = |amplitude| (0..8).map(move |eighth| [amplitude, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
+        AMPLITUDES.into_iter().flat_map(axes).map(|values| self.coordinates_of(&values)).collect()
     }
 
     /// Coordinates of the strengths.

@@ -133,9 +133,14 @@ pub(crate) fn best_places(
             found.extend(scored.filter(|(score, _)| *score > 0.0));
         }
     }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    best_apart(found, near, count)
+}
+
+/// Those with the highest scores, at most `count`, none near a better one.
+fn best_apart(mut scored: Vec<(f64, Place)>, near: impl Fn(&Place, &Place) -> bool, count: usize) -> Vec<Place> {
+    scored.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<Place> = Vec::new();
-    for (_, place) in found {
+    for (_, place) in scored {
         if chosen.len() == count {
             break;
         }
@@ -172,15 +177,7 @@ pub(crate) fn finer_places(
         }
         (most, place)
     };
-    let mut moved: Vec<(f64, Place)> = places.into_iter().map(move_to_best).collect();
-    moved.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut kept: Vec<Place> = Vec::new();
-    for (_, place) in moved {
-        if !kept.iter().any(|other| same(other, &place)) {
-            kept.push(place);
-        }
-    }
-    kept
+    best_apart(places.into_iter().map(move_to_best).collect(), same, usize::MAX)
 }
 
 fn witness(rows: &[Happened], outlines: Outlines) -> Witness {
