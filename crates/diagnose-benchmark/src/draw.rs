@@ -26,10 +26,12 @@ use crate::generate::{Actions, FRICTION, MASS_KG};
 
 /// Whether a log of such actions can say anything of an effect. In a passive log force gain and mass are one number (no weight is known), an
 /// episode of 3 s ends before a drift of the force has left the noise, and what sticks lets go within a millisecond of a push at 4 cm/s or more.
+/// Round edges show in what tumbles alone.
 #[must_use]
 pub fn identifiable(kind: EffectKind, actions: Actions) -> bool {
-    actions == Actions::Designed
-        || !matches!(kind, EffectKind::ForceGain | EffectKind::ForceDrift | EffectKind::StaticFriction)
+    use EffectKind as K;
+    kind != K::EdgeRounding
+        && (actions == Actions::Designed || !matches!(kind, K::ForceGain | K::ForceDrift | K::StaticFriction))
 }
 
 /// Which object shows an effect.
@@ -91,6 +93,7 @@ pub fn effect(
             let [x, y] = plane(between(0.06, 0.28));
             vec![x, y, 0.0]
         }
+        K::EdgeRounding => vec![between(0.001, 0.01)],
         K::MassLeak => vec![between(if actions == Actions::Designed { 0.003 } else { 0.008 }, 0.02)],
         K::Restitution => vec![between(0.25, 0.8)],
         K::ContactCompliance => vec![between(32.0, 20.0), 5.0],

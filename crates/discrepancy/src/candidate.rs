@@ -162,8 +162,12 @@ fn applies(kind: EffectKind, context: &Context) -> bool {
         K::JointFriction => context.joint_torques,
         K::Backlash => context.joints,
         K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion => context.tool,
+        // What is thrown leaves its path wherever it meets the table: that says nothing of bodies.
+        K::HiddenObstacle => context.tool,
         K::RollingResistance => sphere,
         K::PressureDistribution => !sphere,
+        // What is pushed stays on its sole; of an outline the edges are its own.
+        K::EdgeRounding => !sphere && !context.tool,
         _ => true,
     }
 }
@@ -263,9 +267,9 @@ fn left_alone(kind: EffectKind, index: usize, context: &Context) -> bool {
     match kind {
         // Where a payload's centre is shows in torques alone.
         EffectKind::WristPayload => index > 0 && !(context.wrist_torques || context.joint_torques),
+        // What is pushed never leaves the table; what is thrown hits it, and tumbles.
         EffectKind::ContactCompliance => index == 1,
-        // The centre of a sphere that stays where it is in the table's frame.
-        EffectKind::ComOffset => index == 2 && context.theta.object.shape != ObjectShape::Sphere,
+        EffectKind::ComOffset => index == 2 && context.tool && context.theta.object.shape != ObjectShape::Sphere,
         _ => false,
     }
 }

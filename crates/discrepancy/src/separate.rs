@@ -30,6 +30,12 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ("anisotropic_friction", "table_tilt", "push in eight directions: tilt has one period a turn, anisotropy two"),
     ("friction_patch", "mass_leak", "repeat the same push elsewhere on the table"),
     ("tether", "friction_patch", "begin at different places: a tether grows with distance"),
+    (
+        "edge_rounding",
+        "contact_compliance",
+        "lay the object on a face and on an edge: soft contacts let both sink, round edges the latter alone",
+    ),
+    ("edge_rounding", "pose_scale", "read the height at rest on a face: only a wrong scale changes it"),
     ("com_offset", "pressure_distribution", "push left and right of the middle, and spin the object"),
     ("actuation_delay", "pose_delay", "look at when the force sets in: a late pose does not shift it"),
     ("actuator_gain", "pose_scale", "compare with the joint encoders in free motion"),

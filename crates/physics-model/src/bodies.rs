@@ -45,6 +45,8 @@ pub(crate) struct BodySpec {
     pub(crate) friction: f64,
     /// Where it bears on the table (see [`crate::effect::Nominal::support_share`]).
     pub(crate) support_share: Option<f64>,
+    /// Radius of its edges and corners, m; 0: sharp. A prism's are.
+    pub(crate) edge_radius_m: f64,
     pub(crate) beyond: Beyond,
 }
 
@@ -74,6 +76,7 @@ impl BodySpec {
             com_m: o.com_m,
             friction: o.friction,
             support_share,
+            edge_radius_m: 0.0,
             beyond,
         }
     }
@@ -86,6 +89,7 @@ impl BodySpec {
             com_m: [0.0; 3],
             friction: config.obstacle_friction,
             support_share: None,
+            edge_radius_m: 0.0,
             beyond: Beyond::default(),
         }
     }
@@ -98,6 +102,7 @@ impl BodySpec {
             com_m: [0.0; 3],
             friction: config.obstacle_friction,
             support_share: None,
+            edge_radius_m: 0.0,
             beyond: Beyond::default(),
         }
     }
@@ -170,7 +175,7 @@ impl BodySpec {
             return prism.support_points_m(self.support_share);
         }
         let Some(share) = self.support_share else { return Vec::new() };
-        let [a, b, _] = self.shape.half_extents_m(self.size_m).map(|half| share * half);
+        let [a, b, _] = self.shape.half_extents_m(self.size_m).map(|half| share * (half - self.edge_radius_m));
         match self.shape {
             ObjectShape::Box => vec![[a, b], [a, -b], [-a, b], [-a, -b]],
             ObjectShape::Cylinder | ObjectShape::Sphere => vec![[a, 0.0], [-a, 0.0], [0.0, a], [0.0, -a]],
@@ -228,7 +233,7 @@ fn main_collider(spec: &BodySpec, on_supports: bool) -> ColliderBuilder {
         *height -= SOLE_GAP_M;
         shift.z = (0.5 * SOLE_GAP_M) as f32;
     }
-    ColliderBuilder::new(shared_shape(spec.shape, size_m))
+    ColliderBuilder::new(rounded_shape(spec.shape, size_m, spec.edge_radius_m))
         .translation(shift)
         .rotation(shape_axis_angle(spec.shape))
         .density(0.0)
@@ -260,6 +265,19 @@ pub(crate) fn shared_shape(shape: ObjectShape, size_m: [f64; 3]) -> SharedShape 
         ObjectShape::Box => SharedShape::new(Cuboid::new(Vector::new(a, b, c) / 2.0)),
         ObjectShape::Cylinder => SharedShape::new(Cylinder::new(b / 2.0, a)),
         ObjectShape::Sphere => SharedShape::new(Ball::new(a)),
+    }
+}
+
+/// A shape within the same faces whose edges and corners have a radius.
+fn rounded_shape(shape: ObjectShape, size_m: [f64; 3], radius_m: f64) -> SharedShape {
+    let radius = radius_m as f32;
+    let [a, b, c] = size_m.map(|v| v as f32);
+    match shape {
+        ObjectShape::Box if radius > 0.0 => {
+            SharedShape::round_cuboid(a / 2.0 - radius, b / 2.0 - radius, c / 2.0 - radius, radius)
+        }
+        ObjectShape::Cylinder if radius > 0.0 => SharedShape::round_cylinder(b / 2.0 - radius, a - radius, radius),
+        _ => shared_shape(shape, size_m),
     }
 }
 

@@ -129,6 +129,8 @@ pub struct Nominal {
     pub theta: Theta,
     /// Where the object bears on the table, as a share of the way from its centre to the corners or the rim; `None`: as the engine finds contacts.
     pub support_share: Option<f64>,
+    /// Radius, m, of the object's edges and corners; 0: sharp.
+    pub edge_radius_m: f64,
     /// Stiffness, N/m, of the spring that holds the tool; infinite for a tool that is where it is commanded to be.
     pub tool_stiffness_npm: f64,
     /// Bodies that Θ knows nothing of.
@@ -143,6 +145,7 @@ impl Nominal {
             world: world.clone(),
             theta: theta.clone(),
             support_share: None,
+            edge_radius_m: 0.0,
             tool_stiffness_npm: f64::INFINITY,
             hidden: Vec::new(),
         }

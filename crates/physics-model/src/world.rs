@@ -179,12 +179,13 @@ impl<'a> World<'a> {
         let changed = Nominal::with_effects(config, theta, effects);
         let (config, theta) = changed.as_ref().map_or((config, theta), |nominal| (&nominal.world, &nominal.theta));
         let support_share = changed.as_ref().and_then(|nominal| nominal.support_share);
+        let edge_radius_m = changed.as_ref().map_or(0.0, |nominal| nominal.edge_radius_m);
         let mut physics = engine(config, effects);
         let (_, table) = physics.insert(
             RigidBodyBuilder::fixed().translation(vector([0.0, 0.0, config.table_height_m])),
             material(ColliderBuilder::new(SharedShape::halfspace(Vector::Z)), TABLE_FRICTION, config),
         );
-        let spec = BodySpec::object(theta, support_share, beyond);
+        let spec = BodySpec { edge_radius_m, ..BodySpec::object(theta, support_share, beyond) };
         let object = insert_body(&mut physics, config, BodyRole::Object, true, spec, object);
         let obstacle = theta.obstacle.as_ref().zip(obstacle).map(|(parameters, state)| {
             let movable = config.obstacle_mobility == ObstacleMobility::Movable;

@@ -93,8 +93,8 @@ fn largest_difference(a: &[Observation], b: &[Observation]) -> f64 {
 }
 
 #[test]
-fn the_catalogue_has_34_names_that_scenario_files_know() {
-    assert_eq!(EffectKind::ALL.len(), 34, "33 rows, one of which names two");
+fn the_catalogue_has_35_names_that_scenario_files_know() {
+    assert_eq!(EffectKind::ALL.len(), 35, "33 rows, one of which names two, and round edges");
     for kind in EffectKind::ALL {
         assert_eq!(kind.name().parse::<EffectKind>(), Ok(*kind));
         for effect in kind.variants() {

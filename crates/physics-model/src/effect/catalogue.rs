@@ -97,6 +97,7 @@ catalogue! {
     ConstantForce: "A force on the object.",
     Tether: "A spring from the object to a point.",
     ComOffset: "The centre of mass is elsewhere.",
+    EdgeRounding: "Edges and corners are round.",
     MassLeak: "The object loses mass.",
     Restitution: "Bodies bounce.",
     ContactCompliance: "Another stiffness and damping of contacts.",
