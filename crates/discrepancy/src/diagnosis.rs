@@ -25,11 +25,16 @@ use crate::trial::{Trial, groups};
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
 
+/// What it takes, in simulated episodes, to learn anew how large errors of held-out tosses are.
+const LEARNT_ANEW: usize = 200;
+
 /// What the search may do.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Seed of the hold-out split, of the bootstrap and of the test of what is left.
     pub seed: u64,
+    /// Part of how many that is held out, counted from 0 (cross-validation); `None`: what the log says.
+    pub fold: Option<[usize; 2]>,
     /// Kinds that are fitted to the episodes of the screening.
     pub quick_fits: usize,
     /// The best of those, that are fitted to all.
@@ -42,6 +47,8 @@ pub struct Settings {
     pub threshold_rolling: f64,
     /// Effects at most.
     pub effects: usize,
+    /// The same of what is thrown: the whole shape of an object, its centre of mass and its bounces show in tosses, none of which a push tells.
+    pub effects_thrown: usize,
     /// After this many simulated episodes no further effect is looked for, and of rivals the first alone is fitted to all. This and the next two are of logs
     /// of 40 episodes or fewer, and in proportion of longer ones.
     pub rollouts: usize,
@@ -71,10 +78,21 @@ impl Settings {
     }
 }
 
+impl Settings {
+    /// For what is thrown.
+    fn thrown(&self) -> Self {
+        let effects = if self.effects == 0 { 0 } else { self.effects.max(self.effects_thrown) };
+        let [rollouts, most, limit] =
+            [self.rollouts, self.most, self.limit].map(|count| count.saturating_sub(LEARNT_ANEW));
+        Self { effects, rollouts, most, limit, ..self.clone() }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
             seed: 1,
+            fold: None,
             quick_fits: 6,
             fits: 3,
             confusion: 20.0_f64.ln(),
@@ -82,6 +100,7 @@ impl Default for Settings {
             threshold: 10.0,
             threshold_rolling: 20.0,
             effects: 2,
+            effects_thrown: 3,
             rollouts: 4000,
             most: 4300,
             limit: 4800,
@@ -137,7 +156,8 @@ pub struct Diagnosis {
 /// [`Error::Unfit`] for a log without poses of the object, or with too few episodes that can be simulated.
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
     let noise = NoiseLevels::of_log(log);
-    let (trials, [fitted, heldout]) = trials(log, name, nominal, &noise, settings.seed)?;
+    let (trials, [fitted, heldout]) = trials(log, name, nominal, &noise, settings)?;
+    let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
     let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]);
     let engine = nominal.engine();
@@ -165,6 +185,10 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     };
     let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
     let null = rounds[0].base.clone();
+    // How errors of the start and of the engine grow in an impact is for the model to say that explains it.
+    if accepted.model.parts.len() > 1 && !nominal.has_tool() {
+        search.kept.learn_errors(&accepted.model.hypothesis(&accepted.x));
+    }
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
     // Of each episode, whose pieces come one after another.
     let heldout_episodes = (episodes.heldout.iter())
@@ -207,9 +231,12 @@ fn trials(
     name: &str,
     nominal: &Nominal,
     noise: &NoiseLevels,
-    seed: u64,
+    settings: &Settings,
 ) -> Result<(Vec<Trial>, [Vec<usize>; 2]), Error> {
-    let split = log.split(seed);
+    let split = match settings.fold {
+        Some([part, parts]) => log.fold(settings.seed, part, parts),
+        None => log.split(settings.seed),
+    };
     let mut trials = Vec::new();
     let mut sides = [Vec::new(), Vec::new()];
     for (index, episode) in log.episodes.iter().enumerate() {

@@ -55,7 +55,7 @@ struct Sums {
 /// towards 0 where it has few residuals, so that one odd episode does not hide what all show (see [`chances`]).
 #[must_use]
 pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> Vec<Cell> {
-    let rolls = simulator.nominal.rolls();
+    let (rolls, gravity_mps2) = (simulator.nominal.rolls(), simulator.nominal.header().gravity_mps2);
     let hypothesis = fit.model.hypothesis(&fit.x);
     let mut cells: BTreeMap<(Kind, Phase), Sums> = BTreeMap::new();
     let groups = groups(chosen.iter().map(|index| &simulator.trials[*index]));
@@ -63,7 +63,7 @@ pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> 
         let group = groups.partition_point(|group| group.end <= place);
         let trial = &simulator.trials[*index];
         let (_, readings) = simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial);
-        let phases = trial.phases(&readings, rolls);
+        let phases = trial.phases(&readings, rolls, gravity_mps2);
         let end_secs = trial.time_secs[trial.time_secs.len() - 1] - trial.time_secs[0];
         let residuals: &DVector<f64> = &fit.residuals[place];
         for (block, residual) in trial.blocks.iter().zip(residuals.iter()) {

@@ -24,6 +24,9 @@ struct Arguments {
     /// Seed of the hold-out split and of the bootstrap.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Holds out part I of K of the episodes instead of the share that the log says: K runs make a cross-validation.
+    #[arg(long, value_name = "I/K", value_parser = fold)]
+    fold: Option<[usize; 2]>,
     /// Worker threads [default: all cores]; the answer does not depend on it.
     #[arg(long)]
     threads: Option<usize>,
@@ -64,7 +67,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     whole_file::check_owner(&out, "report.json").map_err(|source| Error::Taken { source })?;
     let made = !out.exists();
     std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
-    let settings = Settings { seed: arguments.seed, ..Settings::default() };
+    let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
     let name = arguments.measured.display().to_string();
     let diagnosis = diagnose(&log, &name, &nominal, &settings).inspect_err(|_| {
         // A log that says too little leaves nothing behind.
@@ -83,6 +86,15 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         print_summary(&report, &out);
     }
     Ok(())
+}
+
+/// Part and number of parts, the part counted from 0.
+fn fold(text: &str) -> Result<[usize; 2], String> {
+    let parts = text.split_once('/').and_then(|(part, parts)| Some([part.parse().ok()?, parts.parse().ok()?]));
+    match parts {
+        Some([part, parts]) if parts >= 2 && (1..=parts).contains(&part) => Ok([part - 1, parts]),
+        _ => Err("expected I/K with two parts or more and I from 1 to K, as in 1/5".into()),
+    }
 }
 
 fn default_folder(measured: &Path) -> PathBuf {

@@ -300,7 +300,11 @@ fn retuned(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<Retuned> {
 
 fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -> String {
     let names: Vec<&str> = effects.iter().map(|effect| effect.name).collect();
-    let names = names.join(" and ");
+    let comes = if names.len() > 1 { "come" } else { "comes" };
+    let names = match names.as_slice() {
+        [before @ .., first, last] => [before, &[&format!("{first} and {last}")]].concat().join(", "),
+        names => names.concat(),
+    };
     match verdict {
         Verdict::Effect => {
             // What few episodes meet may leave the others as they were, or hit one of them harder.
@@ -318,7 +322,7 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
             )
         }
         Verdict::Unknown => format!(
-            "Something is missing that no effect of the catalogue explains; {names} comes nearest: held-out error {before:.2}, \
+            "Something is missing that no effect of the catalogue explains; {names} {comes} nearest: held-out error {before:.2}, \
              with it {after:.2} (1 is noise)."
         ),
     }

@@ -78,7 +78,10 @@ impl Search<'_> {
                 remaining = None;
                 break;
             }
-            if let [first, second] = rounds.as_mut_slice() {
+            // A third one is worth more than to ask which two it was.
+            if settings.effects == 2
+                && let [first, second] = rounds.as_mut_slice()
+            {
                 self.exchange(screening, [first, second], episodes);
                 accepted = second.best(true).clone();
             }

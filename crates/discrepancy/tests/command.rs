@@ -58,6 +58,20 @@ fn the_report_keeps_its_contract() {
 }
 
 #[test]
+fn a_part_that_is_none_is_refused() {
+    for wrong in ["0/5", "6/5", "1/1", "1", "a/b", "-1/5"] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_diagnose"));
+        command.arg("--measured").arg(root().join("tests/data/mujoco-logs/logs/set-002")).arg("--out").arg(&out);
+        let output = command.arg(format!("--fold={wrong}")).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{wrong}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("expected I/K"), "{wrong}");
+        assert!(!out.exists());
+    }
+}
+
+#[test]
 fn a_broken_log_ends_with_code_2_one_sentence_and_nothing_written() {
     type Change = fn(&str) -> String;
     let cases: [(&str, Change, &str); 5] = [

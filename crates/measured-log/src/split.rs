@@ -20,17 +20,36 @@ impl Log {
     /// The round(fraction · episodes) smallest tickets (halves up) are held out. So an episode that is added moves at most one other across.
     #[must_use]
     pub fn split(&self, seed: u64) -> Split {
+        let order = self.shuffled(seed);
+        Split::of(&order, 0..held_out(self.header.split.holdout_fraction, order.len()))
+    }
+
+    /// The split of cross-validation that holds out part `part` of `parts`, counted from 0: episodes in the order of [`Self::split`]'s tickets, cut into
+    /// parts whose lengths differ by one at most. Nothing is held out of a part that does not exist.
+    #[must_use]
+    pub fn fold(&self, seed: u64, part: usize, parts: usize) -> Split {
+        let order = self.shuffled(seed);
+        let end = |part: usize| part.min(parts) * order.len() / parts.max(1);
+        Split::of(&order, end(part)..end(part + 1))
+    }
+
+    /// Indices of the episodes by their tickets.
+    fn shuffled(&self, seed: u64) -> Vec<usize> {
         let mut tickets: Vec<(u64, usize)> =
             self.episodes.iter().enumerate().map(|(index, episode)| (ticket(seed, episode.id), index)).collect();
         tickets.sort_unstable();
-        let count = held_out(self.header.split.holdout_fraction, tickets.len());
-        let indices = |part: &[(u64, usize)]| {
-            let mut indices: Vec<usize> = part.iter().map(|(_, index)| *index).collect();
+        tickets.into_iter().map(|(_, index)| index).collect()
+    }
+}
+
+impl Split {
+    /// Holds out a range of an order of episodes.
+    fn of(order: &[usize], held: std::ops::Range<usize>) -> Self {
+        let sorted = |mut indices: Vec<usize>| {
             indices.sort_unstable();
             indices
         };
-        let (holdout, fit) = tickets.split_at(count);
-        Split { fit: indices(fit), holdout: indices(holdout) }
+        Self { fit: sorted([&order[..held.start], &order[held.end..]].concat()), holdout: sorted(order[held].to_vec()) }
     }
 }
 

@@ -320,6 +320,21 @@ proptest! {
     }
 
     #[test]
+    fn the_parts_of_a_cross_validation_hold_out_every_episode_once(log in logs(), seed in any::<u64>(), parts in 1..9_usize) {
+        let folds: Vec<_> = (0..parts).map(|part| log.fold(seed, part, parts)).collect();
+        let mut held: Vec<usize> = folds.iter().flat_map(|split| split.holdout.clone()).collect();
+        held.sort_unstable();
+        prop_assert_eq!(&held, &(0..log.episodes.len()).collect::<Vec<_>>());
+        let lengths = || folds.iter().map(|split| split.holdout.len());
+        prop_assert!(lengths().max() <= lengths().min().map(|least| least + 1));
+        for split in &folds {
+            prop_assert!(split.fit.iter().all(|index| !split.holdout.contains(index)));
+            prop_assert_eq!(split.fit.len() + split.holdout.len(), log.episodes.len());
+        }
+        prop_assert_eq!(log.fold(seed, parts, parts).holdout, Vec::<usize>::new());
+    }
+
+    #[test]
     fn the_split_knows_ids_and_seed_alone(log in logs(), seed in any::<u64>()) {
         let split = log.split(seed);
         prop_assert!(!split.fit.is_empty() && !split.holdout.is_empty());

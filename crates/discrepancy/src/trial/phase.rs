@@ -7,6 +7,10 @@ use super::Trial;
 
 /// Less than this, N, is no contact.
 const CONTACT_N: f64 = 0.02;
+/// What is thrown is held if its acceleration differs from gravity's by this share of it.
+const HELD: f64 = 0.3;
+/// How long, s, its impact on the table lasts.
+const IMPACT_SECS: f64 = 0.02;
 /// How long, s, a contact is new.
 const ONSET_SECS: f64 = 0.1;
 
@@ -14,15 +18,15 @@ const ONSET_SECS: f64 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
-    /// Nothing has touched the tool yet.
+    /// Nothing has touched the tool yet; of what is thrown: it has touched nothing.
     FreeMotion,
     /// The first tenth of a second of a contact.
     ContactOnset,
-    /// Tool and object touch, and the object does not roll.
+    /// Tool and object touch, and the object does not roll; of what is thrown: it touches the table.
     Sliding,
-    /// Tool and a round object touch.
+    /// The same of a round object.
     Rolling,
-    /// The tool has touched the object before.
+    /// Tool and object, or what is thrown and the table, have touched before.
     AfterContact,
 }
 
@@ -41,14 +45,34 @@ impl Phase {
 }
 
 impl Trial {
-    /// What goes on in each row of a simulated episode.
+    /// What goes on in each row of a simulated episode. Of what is thrown the readings say when it does not fall with `gravity_mps2`.
     #[must_use]
-    pub fn phases(&self, readings: &[RigReading], rolls: bool) -> Vec<Phase> {
-        let onset = (ONSET_SECS / self.tick_secs()).ceil() as usize;
+    pub fn phases(&self, readings: &[RigReading], rolls: bool, gravity_mps2: f64) -> Vec<Phase> {
+        let tick_secs = self.tick_secs();
+        let onset_secs = if self.tool_m.is_some() { ONSET_SECS } else { IMPACT_SECS };
+        let onset = (onset_secs / tick_secs).ceil() as usize;
+        let mut before_mps = self.start.linear_mps;
+        let mut touches = |reading: &RigReading| {
+            let [ax, ay, az] = std::array::from_fn(|i| (reading.object.linear_mps[i] - before_mps[i]) / tick_secs);
+            before_mps = reading.object.linear_mps;
+            let held_mps2 = ax.hypot(ay).hypot(az + gravity_mps2);
+            if self.tool_m.is_some() {
+                reading.wrench.force_magnitude_n() > CONTACT_N
+            } else {
+                held_mps2 > HELD * gravity_mps2
+            }
+        };
         let (mut since, mut touched, mut by_tick) = (0, false, vec![Phase::FreeMotion]);
-        for reading in readings {
-            if reading.wrench.force_magnitude_n() > CONTACT_N {
-                since = if touched { since + 1 } else { 0 };
+        for (tick, reading) in readings.iter().enumerate() {
+            if touches(reading) {
+                // A piece of a toss may begin on the table.
+                since = if touched {
+                    since + 1
+                } else if tick == 0 && self.tool_m.is_none() {
+                    onset
+                } else {
+                    0
+                };
                 touched = true;
                 let moving = if rolls { Phase::Rolling } else { Phase::Sliding };
                 by_tick.push(if since < onset { Phase::ContactOnset } else { moving });
