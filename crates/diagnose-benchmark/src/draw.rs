@@ -26,7 +26,7 @@ use crate::generate::{Actions, FRICTION, MASS_KG};
 
 /// Whether a log of such actions can say anything of an effect. In a passive log force gain and mass are one number (no weight is known), an
 /// episode of 3 s ends before a drift of the force has left the noise, and what sticks lets go within a millisecond of a push at 4 cm/s or more.
-/// Round edges show in what tumbles alone.
+/// Round edges of what is pushed are a smaller sole, as `pressure_distribution` has it.
 #[must_use]
 pub fn identifiable(kind: EffectKind, actions: Actions) -> bool {
     use EffectKind as K;

@@ -44,6 +44,8 @@ pub struct Context {
     pub largest_force_n: f64,
     /// Whether there is a tool that is commanded.
     pub tool: bool,
+    /// Whether the object is an outline that was extruded.
+    pub outline: bool,
     /// Whether the log has forces at the wrist or torques of joints.
     pub forces: bool,
     /// Whether there is an arm with joints.
@@ -166,8 +168,8 @@ fn applies(kind: EffectKind, context: &Context) -> bool {
         K::HiddenObstacle => context.tool,
         K::RollingResistance => sphere,
         K::PressureDistribution => !sphere,
-        // What is pushed stays on its sole; of an outline the edges are its own.
-        K::EdgeRounding => !sphere && !context.tool,
+        // What is pushed stays on its sole, whose size `pressure_distribution` has; of an outline the edges are its own.
+        K::EdgeRounding => !sphere && !context.tool && !context.outline,
         _ => true,
     }
 }
@@ -267,8 +269,8 @@ fn left_alone(kind: EffectKind, index: usize, context: &Context) -> bool {
     match kind {
         // Where a payload's centre is shows in torques alone.
         EffectKind::WristPayload => index > 0 && !(context.wrist_torques || context.joint_torques),
-        // What is pushed never leaves the table; what is thrown hits it, and tumbles.
         EffectKind::ContactCompliance => index == 1,
+        // What is pushed stays upright, where the height of its centre hardly shows; of a sphere it does, which stays where it is in the table's frame.
         EffectKind::ComOffset => index == 2 && context.tool && context.theta.object.shape != ObjectShape::Sphere,
         _ => false,
     }
@@ -343,6 +345,7 @@ mod tests {
             patches_m: vec![([0.4, 0.1], 0.09)],
             largest_force_n: 10.0,
             tool: true,
+            outline: false,
             forces: true,
             joints: true,
             wrist_torques: true,
@@ -383,13 +386,17 @@ mod tests {
 
     #[test]
     fn candidates_are_neutral_where_they_begin_and_plausible_one_unit_away() {
-        let context = context();
-        let all = candidates(&context);
+        use EffectKind as K;
+        let thrown = Context { tool: false, ..context() };
+        let [pushed, thrown] = [context(), thrown].map(|context| candidates(&context));
         for kind in EffectKind::ALL {
-            let expected = *kind != EffectKind::RollingResistance;
-            assert_eq!(all.iter().any(|c| c.kind() == *kind), expected, "{}", kind.name());
+            let expected = !matches!(kind, K::RollingResistance | K::EdgeRounding);
+            assert_eq!(pushed.iter().any(|c| c.kind() == *kind), expected, "{}", kind.name());
+            let tools = matches!(kind, K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion);
+            let expected = !tools && !matches!(kind, K::RollingResistance | K::HiddenObstacle);
+            assert_eq!(thrown.iter().any(|c| c.kind() == *kind), expected, "{}, thrown", kind.name());
         }
-        for candidate in &all {
+        for candidate in pushed.iter().chain(&thrown) {
             let zero = vec![0.0; candidate.coordinates.len()];
             assert_eq!(candidate.effect(&zero), candidate.base);
             for index in candidate.strengths() {

@@ -51,6 +51,7 @@ pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &Nois
         patches_m,
         largest_force_n,
         tool: nominal.has_tool(),
+        outline: matches!(nominal.header().object.shape, measured_log::Shape::Prism { .. }),
         forces: has(Kind::WristForce) || has(Kind::JointTorque),
         joints: has(Kind::JointPosition) || (nominal.joints() > 0 && has(Kind::ToolPosition)),
         wrist_torques: has(Kind::WristTorque),

@@ -25,9 +25,6 @@ use crate::trial::{Trial, groups};
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
 
-/// What it takes, in simulated episodes, to learn anew how large errors of held-out tosses are.
-const LEARNT_ANEW: usize = 200;
-
 /// What the search may do.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -82,9 +79,7 @@ impl Settings {
     /// For what is thrown.
     fn thrown(&self) -> Self {
         let effects = if self.effects == 0 { 0 } else { self.effects.max(self.effects_thrown) };
-        let [rollouts, most, limit] =
-            [self.rollouts, self.most, self.limit].map(|count| count.saturating_sub(LEARNT_ANEW));
-        Self { effects, rollouts, most, limit, ..self.clone() }
+        Self { effects, ..self.clone() }
     }
 }
 
@@ -185,10 +180,6 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     };
     let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
     let null = rounds[0].base.clone();
-    // How errors of the start and of the engine grow in an impact is for the model to say that explains it.
-    if accepted.model.parts.len() > 1 && !nominal.has_tool() {
-        search.kept.learn_errors(&accepted.model.hypothesis(&accepted.x));
-    }
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
     // Of each episode, whose pieces come one after another.
     let heldout_episodes = (episodes.heldout.iter())

@@ -88,12 +88,17 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     Ok(())
 }
 
+/// Parts of a cross-validation, at most.
+const MOST_PARTS: usize = 1000;
+
 /// Part and number of parts, the part counted from 0.
 fn fold(text: &str) -> Result<[usize; 2], String> {
     let parts = text.split_once('/').and_then(|(part, parts)| Some([part.parse().ok()?, parts.parse().ok()?]));
     match parts {
-        Some([part, parts]) if parts >= 2 && (1..=parts).contains(&part) => Ok([part - 1, parts]),
-        _ => Err("expected I/K with two parts or more and I from 1 to K, as in 1/5".into()),
+        Some([part, parts]) if (2..=MOST_PARTS).contains(&parts) && (1..=parts).contains(&part) => {
+            Ok([part - 1, parts])
+        }
+        _ => Err("expected I/K with 2 to 1000 parts and I from 1 to K, as in 1/5".into()),
     }
 }
 

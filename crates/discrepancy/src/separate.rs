@@ -35,6 +35,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "contact_compliance",
         "lay the object on a face and on an edge: soft contacts let both sink, round edges the latter alone",
     ),
+    ("edge_rounding", "pressure_distribution", "let the object tumble: a smaller sole alone changes nothing there"),
     ("edge_rounding", "pose_scale", "read the height at rest on a face: only a wrong scale changes it"),
     ("com_offset", "pressure_distribution", "push left and right of the middle, and spin the object"),
     ("actuation_delay", "pose_delay", "look at when the force sets in: a late pose does not shift it"),

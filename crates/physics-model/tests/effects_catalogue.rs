@@ -217,7 +217,7 @@ fn all_pairs_of_effects_combine() {
                 assert!(finite && particle.state.to_vec().iter().all(|v| v.is_finite()), "{arm} {names:?}: {seen:?}");
             }
         }
-        assert!(diverged == 0, "{arm}: {diverged} of 595 pairs diverged");
+        assert!(diverged == 0, "{arm}: {diverged} of 630 pairs diverged");
     }
 }
 

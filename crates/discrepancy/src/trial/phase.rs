@@ -22,7 +22,7 @@ pub enum Phase {
     FreeMotion,
     /// The first tenth of a second of a contact.
     ContactOnset,
-    /// Tool and object touch, and the object does not roll; of what is thrown: it touches the table.
+    /// Tool and object touch, and the object does not roll; of what is thrown: it touches the table, be it at rest.
     Sliding,
     /// The same of a round object.
     Rolling,
