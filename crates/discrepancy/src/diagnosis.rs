@@ -73,9 +73,7 @@ impl Settings {
         let scaled = |count: usize| count.saturating_mul(episodes.max(EPISODES)) / EPISODES;
         Self { rollouts: scaled(self.rollouts), most: scaled(self.most), limit: scaled(self.limit), ..self.clone() }
     }
-}
 
-impl Settings {
     /// For what is thrown.
     fn thrown(&self) -> Self {
         let effects = if self.effects == 0 { 0 } else { self.effects.max(self.effects_thrown) };

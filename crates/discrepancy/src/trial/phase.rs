@@ -20,7 +20,7 @@ const ONSET_SECS: f64 = 0.1;
 pub enum Phase {
     /// Nothing has touched the tool yet; of what is thrown: it has touched nothing.
     FreeMotion,
-    /// The first tenth of a second of a contact.
+    /// The first tenth of a second of a contact; of what is thrown, its first 20 ms.
     ContactOnset,
     /// Tool and object touch, and the object does not roll; of what is thrown: it touches the table, be it at rest.
     Sliding,
