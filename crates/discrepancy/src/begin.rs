@@ -13,6 +13,9 @@ use crate::study::Study;
 /// An effect can do what another does if it leaves less than this of the change's squares.
 const MOST: f64 = 0.5;
 
+/// A linear step that moves a tunable by more than this, in standard deviations of its prior, is tried with what it moves.
+const FAR: f64 = 1.0;
+
 /// Fits anew from other strengths of the last effect, if one of them is better than where the fit is.
 pub(crate) fn shake(part: &Study, best: &mut Fit) {
     let Some(candidate) = best.model.parts.last().filter(|part| part.begin.is_none()) else { return };
@@ -111,17 +114,34 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
         let raw = part.raw(&model.hypothesis(&x));
         Place { cost: cost(&x, &part.white(&raw, model.engine_errors(&x))), x, raw }
     };
+    // Where re-tuning has gone far to do what an effect does, neither is right without the other.
+    let together = |share: f64| -> Vec<f64> {
+        let moved = base.x.iter().zip(&promise.beside).enumerate().map(|(index, (x, d))| {
+            let [low, high] = model.range(index);
+            (x + share * d).clamp(low, high)
+        });
+        moved.chain(promise.begin.iter().map(|a| share * a)).collect()
+    };
     let good = |place: &Place| before - place.cost > 0.5 * promised;
     let mut tried: Vec<Place> = Vec::new();
     // From a border, where a strength may have no more effect, a fit does not find back.
     let at_border = (promise.begin.iter().zip(&promise.candidate.coordinates))
         .any(|(a, coordinate)| coordinate.strength && *a != 0.0 && coordinate.range.contains(a));
     let whole = if at_border { 0.5 } else { 1.0 };
-    for share in [whole, 0.4 * whole, 0.1 * whole] {
-        tried.push(simulated(at(share)));
-        if promise.candidate.begin.is_some() || (share < whole && tried.last().is_some_and(good)) {
-            break;
+    // Beside another effect, which has taken its share of what this one does, too.
+    if !base.model.parts.is_empty() && promise.candidate.begin.is_none() {
+        tried.push(simulated(together(whole)));
+    }
+    if !tried.iter().any(good) {
+        for share in [whole, 0.4 * whole, 0.1 * whole] {
+            tried.push(simulated(at(share)));
+            if promise.candidate.begin.is_some() || (share < whole && tried.last().is_some_and(good)) {
+                break;
+            }
         }
+    }
+    if base.model.parts.is_empty() && promise.beside.iter().take(model.tunables).any(|d| d.abs() > FAR) {
+        tried.extend([whole, 0.4 * whole].map(|share| simulated(together(share))));
     }
     if !tried.iter().any(good) {
         let elsewhere = promise.candidate.elsewhere().into_iter();

@@ -20,6 +20,8 @@ const FAR: f64 = 1.2;
 const SOFT: f64 = 0.5;
 /// Anisotropies that are tried along every axis.
 const AMPLITUDES: [f64; 2] = [0.04, 0.1];
+/// Coefficients of restitution that are tried.
+const BOUNCES: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
 /// Places of a patch that are tried.
 const PATCHES: usize = 6;
 /// Standard deviation of where something is, m, around the place that a fit begins from.
@@ -133,6 +135,10 @@ impl Candidate {
     /// Coordinates to begin from where a linear step leads nowhere.
     #[must_use]
     pub fn elsewhere(&self) -> Vec<Vec<f64>> {
+        // Every bounce more or less is a ridge; once is enough for the kind.
+        if self.kind() == EffectKind::Restitution && self.reach == FAR {
+            return BOUNCES.iter().map(|coefficient| self.coordinates_of(&[*coefficient])).collect();
+        }
         if self.kind() != EffectKind::AnisotropicFriction {
             return Vec::new();
         }
@@ -208,6 +214,10 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         // What a bounce or a soft contact changes is no multiple of what a slight one or a stiffer one does.
         EffectKind::Restitution | EffectKind::Adhesion => {
             [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
+        }
+        // Seen from half a metre a few degrees or hundredths are centimetres: pushes miss, and a slight one says nothing of them.
+        EffectKind::PoseRotation | EffectKind::PoseScale => {
+            [REACH, FAR, -FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
         }
         EffectKind::ContactCompliance => {
             let near = with(&[]);

@@ -34,7 +34,9 @@ pub struct Settings {
     pub fold: Option<[usize; 2]>,
     /// Kinds that are fitted to the episodes of the screening.
     pub quick_fits: usize,
-    /// The best of those, that are fitted to all.
+    /// Kinds that are simulated where a fit of a further effect would begin; the best `fits` of them are fitted.
+    pub begins: usize,
+    /// The best of those, that are fitted to all; kinds of a further effect that are fitted to the episodes of the screening.
     pub fits: usize,
     /// Rivals nearer than this in ln evidence are in the confusion set.
     pub confusion: f64,
@@ -87,6 +89,7 @@ impl Default for Settings {
             seed: 1,
             fold: None,
             quick_fits: 6,
+            begins: 5,
             fits: 3,
             confusion: 20.0_f64.ln(),
             // Of 28 simulated logs without an effect, 20 of boxes and cylinders gained up to 5, 8 of balls up to 17 by what else convinced.

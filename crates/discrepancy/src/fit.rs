@@ -95,6 +95,13 @@ impl Begin {
     pub fn at(x: &[f64]) -> Self {
         Self { x: x.to_vec(), raw: None, jacobian: Vec::new() }
     }
+
+    /// −ln posterior there, but for a constant; ∞ where residuals are not known.
+    #[must_use]
+    pub fn cost(&self, study: &Study, model: &Model) -> f64 {
+        let white = |raw: &Vec<Vec<f64>>| cost(&self.x, &study.white(raw, model.engine_errors(&self.x)));
+        self.raw.as_ref().map_or(f64::INFINITY, white)
+    }
 }
 
 /// Fits a model.

@@ -28,6 +28,8 @@ pub struct Promise {
     pub episodes: usize,
     /// Coordinates to begin a fit from.
     pub begin: Vec<f64>,
+    /// By how much the coordinates of the model without it would move then.
+    pub beside: Vec<f64>,
 }
 
 /// What was simulated for the screening: it serves again when an effect has been accepted.
@@ -95,10 +97,10 @@ impl Screening {
         let share = episodes as f64 / self.places.len() as f64;
         let mut promises: Vec<Promise> = (self.columns.iter())
             .map(|(candidate, columns)| {
-                let (gain, begin) = match columns {
+                let (gain, begin, beside) = match columns {
                     Columns::Whole(change) => {
                         let begin = candidate.begin.clone().unwrap_or_default();
-                        (met(residuals, &moved(change)) - begin.len() as f64, begin)
+                        (met(residuals, &moved(change)) - begin.len() as f64, begin, vec![0.0; x.len()])
                     }
                     Columns::Linear(columns) => {
                         let strengths: Vec<usize> = candidate.strengths().collect();
@@ -106,15 +108,15 @@ impl Screening {
                         let white: Vec<Stack> = (columns.iter().zip(&strengths))
                             .map(|(change, index)| difference(&moved(change), residuals, reach(index)))
                             .collect();
-                        let (gain, solution) = linear(candidate, &strengths, x, residuals, tuning, &white);
+                        let (gain, mut beside) = linear(candidate, &strengths, x, residuals, tuning, &white);
                         let mut begin = vec![0.0; candidate.coordinates.len()];
-                        for (index, a) in strengths.iter().zip(&solution) {
-                            begin[*index] = *a;
+                        for (index, a) in strengths.iter().zip(beside.split_off(x.len())) {
+                            begin[*index] = a;
                         }
-                        (gain, begin)
+                        (gain, begin, beside)
                     }
                 };
-                Promise { candidate: candidate.clone(), gain: gain * share, episodes, begin }
+                Promise { candidate: candidate.clone(), gain: gain * share, episodes, begin, beside }
             })
             .collect();
         promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -182,7 +184,8 @@ pub(crate) fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
     places
 }
 
-/// What ln evidence gains by the strengths' columns beside re-tuning, and their best values, held to their ranges.
+/// What ln evidence gains by the strengths' columns beside re-tuning; by how much what is re-tuned moves then, followed by the best values of the
+/// strengths, held to their ranges.
 fn linear(
     candidate: &Candidate,
     strengths: &[usize],
@@ -245,8 +248,8 @@ fn linear(
         }
     }
     match best {
-        Some((gain, delta)) => (gain - without, (0..strengths.len()).map(|j| delta[k + j]).collect()),
-        None => (0.0, vec![0.0; strengths.len()]),
+        Some((gain, delta)) => (gain - without, delta.iter().copied().collect()),
+        None => (0.0, vec![0.0; n]),
     }
 }
 

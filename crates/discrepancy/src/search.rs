@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use physics_model::{EffectConfig, EffectKind};
 
-use crate::accept::{Asked, Episodes, better_heldout, both_convince, convinces, lasts, may_convince};
+use crate::accept::{Asked, Episodes, NEGLIGIBLE, better_heldout, both_convince, convinces, lasts, may_convince};
 use crate::begin::{begin, follow, shake};
 use crate::candidate::Candidate;
 use crate::diagnosis::Settings;
@@ -86,7 +86,7 @@ impl Search<'_> {
                 accepted = second.best(true).clone();
             }
             let cells = self.left(&accepted);
-            let another = self.stands_out(&cells);
+            let another = self.stands_out(&cells) || self.promised(screening, &accepted) > self.asked(explained).least;
             remaining = Some(cells);
             if !another {
                 break;
@@ -217,6 +217,12 @@ impl Search<'_> {
         self.study.simulator.affords((model.simulated() + STEPS + 1) * study.rollouts())
     }
 
+    /// Whether it is, and after it one to all episodes.
+    fn affords_both(&self, part: &Study, model: &Model) -> bool {
+        let rollouts = part.rollouts() + self.study.rollouts();
+        self.study.simulator.affords((model.simulated() + STEPS + 1) * rollouts)
+    }
+
     /// What a model leaves, by channel and phase.
     fn left(&self, fit: &Fit) -> Vec<Cell> {
         locate(self.study.simulator, &self.study.chosen, fit, self.settings.seed)
@@ -227,15 +233,28 @@ impl Search<'_> {
         cells.iter().any(|cell| cell.p_value < self.settings.another)
     }
 
+    /// The most that another effect promises beside those of a model, by a linear step: nothing is simulated for it.
+    fn promised(&self, screening: &Screening, fit: &Fit) -> f64 {
+        let part = self.study.part(&screening.places);
+        let promises = self.promises(screening, &part, &fit.part(&screening.places));
+        promises.first().map_or(0.0, |best| best.gain)
+    }
+
+    /// What promises most beside the effects of a model, which knows the episodes of the screening alone, as `part` does.
+    fn promises(&self, screening: &Screening, part: &Study, fit: &Fit) -> Vec<Promise> {
+        let mut promises = screening.promises(part, fit, self.study.chosen.len());
+        // What is there already is fitted with it; a second patch or body is another one.
+        let there: Vec<EffectKind> = fit.model.parts.iter().map(Candidate::kind).collect();
+        promises.retain(|promise| promise.candidate.tied_to_a_place() || !there.contains(&promise.candidate.kind()));
+        promises
+    }
+
     /// Compares what could be added to `base`, which in the first round knows the episodes of the screening alone.
     fn round(&mut self, screening: &Screening, base: &Fit) -> Round {
         let first = base.model.parts.is_empty();
         let part = if first { self.part.clone() } else { self.study.part(&screening.places) };
         let begin = if first { base.clone() } else { base.part(&screening.places) };
-        let mut promises = screening.promises(&part, &begin, self.study.chosen.len());
-        // What is there already is fitted with it; a second patch or body is another one.
-        let there: Vec<EffectKind> = begin.model.parts.iter().map(Candidate::kind).collect();
-        promises.retain(|promise| promise.candidate.tied_to_a_place() || !there.contains(&promise.candidate.kind()));
+        let promises = self.promises(screening, &part, &begin);
         let mut quick = self.quick(screening, &part, &begin, &promises);
         let before = begin.log_evidence();
         let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
@@ -300,6 +319,19 @@ impl Search<'_> {
                 }
                 _ => break,
             }
+        }
+        // Of what a second effect may be the two nearest are compared with care.
+        if !hasty
+            && let [best, second, ..] = rivals.as_slice()
+            && best.whole
+            && !second.whole
+            && best.gain - second.gain < NEAR * share
+            && second.gain > self.settings.threshold
+            && self.affords(&self.study, &second.fit.model)
+        {
+            let second = rivals.remove(1);
+            rivals.push(fully(second.fit));
+            sort(&mut rivals);
         }
         first_of_each(&mut rivals, Rival::kind);
         let mut round = Round { promises, rivals, before: self.heldout(&base), base, hasty };
@@ -371,29 +403,29 @@ impl Search<'_> {
 
     /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.
     fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
-        let count = if base.model.parts.is_empty() { self.settings.quick_fits } else { self.settings.fits };
         let before = base.log_evidence();
         let share = self.share(screening);
         let (mut quick, mut gained, mut kinds) = (Vec::<Fit>::new(), 0.0_f64, Vec::new());
-        for promise in shortlist(promises, count) {
+        for (promise, begun) in self.begun(part, base, promises) {
             let (kind, model) = (promise.candidate.kind(), base.model.with(&promise.candidate));
             let hopeless = kinds.len() >= LEAST_KINDS && promise.gain < HOPELESS * share * gained;
-            if (hopeless && !kinds.contains(&kind)) || !self.affords(part, &model) {
+            // The best one has to be fitted to all episodes, too.
+            if (hopeless && !kinds.contains(&kind)) || !self.affords_both(part, &model) {
                 continue;
             }
             if !kinds.contains(&kind) {
                 kinds.push(kind);
             }
-            let begin = begin(part, base, &model, &promise);
+            let begin = begun.unwrap_or_else(|| begin(part, base, &model, &promise));
             let fit = fit(part, model, begin, Effort::Quick);
             gained = gained.max(fit.log_evidence() - before);
             quick.push(fit);
         }
-        quick.retain(|fit| fit.log_evidence().is_finite());
+        quick.retain(|fit| fit.log_evidence().is_finite() && is_there(fit));
         let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
         sort(&mut quick);
         // Half or one and a half times as strong an effect may lie beyond a ridge that no descent crosses.
-        let within = |fit: &Fit| self.affords(part, &fit.model);
+        let within = |fit: &Fit| self.affords_both(part, &fit.model);
         if let Some(best) = quick.first_mut().filter(|best| within(best)) {
             shake(part, best);
         }
@@ -406,6 +438,31 @@ impl Search<'_> {
         first_of_each(&mut quick, |fit| fit.model.parts.last().map(Candidate::variant));
         quick
     }
+
+    /// What promises most. Beside another effect, which may have gone some of the way, a linear step says less than what is simulated where a fit begins.
+    fn begun(&self, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<(Promise, Option<Begin>)> {
+        if base.model.parts.is_empty() {
+            return shortlist(promises, self.settings.quick_fits).into_iter().map(|promise| (promise, None)).collect();
+        }
+        let mut list = Vec::new();
+        for promise in shortlist(promises, self.settings.begins) {
+            let model = base.model.with(&promise.candidate);
+            if self.affords_both(part, &model) {
+                let begin = begin(part, base, &model, &promise);
+                list.push((begin.cost(part, &model), promise, begin));
+            }
+        }
+        list.sort_by(|a, b| a.0.total_cmp(&b.0));
+        of_first(&mut list, self.settings.fits, |(_, promise, _)| promise.candidate.kind());
+        list.into_iter().map(|(_, promise, begin)| (promise, Some(begin))).collect()
+    }
+}
+
+/// Whether a fit's last effect is more than negligible: what is as good as absent lasts nowhere, and is not worth a fit with care.
+fn is_there(fit: &Fit) -> bool {
+    let Some(part) = fit.model.parts.last() else { return false };
+    let own = &fit.x[fit.x.len() - part.coordinates.len()..];
+    part.begin.is_some() || part.strengths().any(|index| own[index].abs() > NEGLIGIBLE)
 }
 
 /// Kind of a fit's last effect.
