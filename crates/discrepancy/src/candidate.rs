@@ -135,7 +135,7 @@ impl Candidate {
     /// Coordinates to begin from where a linear step leads nowhere.
     #[must_use]
     pub fn elsewhere(&self) -> Vec<Vec<f64>> {
-        // Every bounce more or less is a ridge; once is enough for the kind.
+        // Every bounce more or less is a ridge; for the kind the stronger step alone asks.
         if self.kind() == EffectKind::Restitution && self.reach == FAR {
             return BOUNCES.iter().map(|coefficient| self.coordinates_of(&[*coefficient])).collect();
         }
@@ -215,7 +215,7 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         EffectKind::Restitution | EffectKind::Adhesion => {
             [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
         }
-        // Seen from half a metre a few degrees or hundredths are centimetres: pushes miss, and a slight one says nothing of them.
+        // A few degrees or hundredths are millimetres to centimetres, pushes go another way, and a slight one says nothing of that.
         EffectKind::PoseRotation | EffectKind::PoseScale => {
             [REACH, FAR, -FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
         }
@@ -325,7 +325,7 @@ fn coordinate(kind: EffectKind, index: usize, parameter: &Parameter, value: f64,
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use physics_model::ObjectTheta;
 
@@ -376,6 +376,19 @@ mod tests {
         assert!((soft - 30.0).abs() < 1e-9 && stiff > 60.0, "{soft} and {stiff} Hz, of 60");
         let [little, much] = of(EffectKind::Restitution).map(at_reach).collect::<Vec<_>>()[..] else { panic!() };
         assert!(little > 0.1 && little < 0.3 && much > 0.5 && much < 0.9, "{little} and {much}");
+    }
+
+    #[test]
+    fn frames_are_looked_at_from_far_and_bounces_are_tried_once() {
+        let all = candidates(&context());
+        for kind in [EffectKind::PoseRotation, EffectKind::PoseScale] {
+            let reaches: Vec<f64> = all.iter().filter(|c| c.kind() == kind).map(|c| c.reach).collect();
+            assert_eq!(reaches, [REACH, FAR, -FAR]);
+        }
+        let bounces: Vec<_> = all.iter().filter(|c| c.kind() == EffectKind::Restitution).collect();
+        let tried: Vec<_> = bounces.iter().flat_map(|c| c.elsewhere().into_iter().map(|a| c.effect(&a))).collect();
+        let coefficients: Vec<f64> = tried.iter().map(|effect| effect.values()[0]).collect();
+        assert!(coefficients.iter().zip(BOUNCES).all(|(a, b)| (a - b).abs() < 1e-9) && tried.len() == BOUNCES.len());
     }
 
     #[test]

@@ -34,10 +34,10 @@ pub struct Settings {
     pub fold: Option<[usize; 2]>,
     /// Kinds that are fitted to the episodes of the screening.
     pub quick_fits: usize,
-    /// Kinds that are simulated where a fit of a further effect would begin; the best `fits` of them are fitted.
-    pub begins: usize,
-    /// The best of those, that are fitted to all; kinds of a further effect that are fitted to the episodes of the screening.
+    /// The best of those, that are fitted to all; beside another effect kinds that are fitted to the episodes of the screening.
     pub fits: usize,
+    /// Beside another effect starts, more than one of some kinds, that are simulated to choose those by.
+    pub begins: usize,
     /// Rivals nearer than this in ln evidence are in the confusion set.
     pub confusion: f64,
     /// What an effect has to gain in ln evidence to be named.
@@ -48,8 +48,8 @@ pub struct Settings {
     pub effects: usize,
     /// The same of what is thrown: the whole shape of an object, its centre of mass and its bounces show in tosses, none of which a push tells.
     pub effects_thrown: usize,
-    /// After this many simulated episodes no further effect is looked for, and of rivals the first alone is fitted to all. This and the next two are of logs
-    /// of 40 episodes or fewer, and in proportion of longer ones.
+    /// After this many simulated episodes no further effect is looked for, and of rivals the first and at most its nearest are fitted to all. This and the
+    /// next two are of logs of 40 episodes or fewer, and in proportion of longer ones.
     pub rollouts: usize,
     /// After this many fits end where they are.
     pub most: usize,
@@ -63,7 +63,8 @@ pub struct Settings {
     pub gap: f64,
     /// The same of a single held-out one above which nothing is not the whole story either.
     pub odd: f64,
-    /// Chance that some channel in some phase would stand out as much under a right model, below which another effect is looked for.
+    /// Chance that some channel in some phase would stand out as much under a right model, below which another effect is looked for even
+    /// if none promises enough.
     pub another: f64,
     /// Chance that some channel in some phase would stand out as much under a right model, below which what is left is no chance.
     pub left_by_chance: f64,
@@ -89,8 +90,8 @@ impl Default for Settings {
             seed: 1,
             fold: None,
             quick_fits: 6,
-            begins: 5,
             fits: 3,
+            begins: 5,
             confusion: 20.0_f64.ln(),
             // Of 28 simulated logs without an effect, 20 of boxes and cylinders gained up to 5, 8 of balls up to 17 by what else convinced.
             threshold: 10.0,
@@ -120,7 +121,7 @@ pub struct Diagnosis {
     pub nominal: Fit,
     /// The accepted model; the nominal one where nothing was.
     pub model: Fit,
-    /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out, no more effects are allowed, two were found at once or
+    /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out and no other promises enough, no more effects are allowed, two were found at once or
     /// the budget is used up.
     pub rounds: Vec<Round>,
     /// Sums of squares of the held-out episodes: nominal and accepted model, with the errors of the accepted one.

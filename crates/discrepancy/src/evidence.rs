@@ -1,6 +1,7 @@
 //! What shows the gap to the eye: the worst held-out episode, and what the residuals of all of them look like, before and after.
 //!
-//! Before is the re-tuned nominal model, after the accepted one, both with the errors of the accepted one. Numbers are rounded: they are for plots.
+//! Before is the re-tuned nominal model, after the accepted one, both with the errors of the accepted one. Numbers of plots are
+//! rounded. [`ChannelError`] is of residuals as they are: neither white nor with the engine's errors, so that it may go the other way.
 
 use serde::Serialize;
 
@@ -30,6 +31,26 @@ pub struct Evidence {
     pub course: Option<Course>,
     /// Distribution and whiteness of the held-out residuals.
     pub residuals: Residuals,
+    /// How far all held-out episodes lie from what was measured, by channel.
+    pub errors: Vec<ChannelError>,
+}
+
+/// Size of (measured − simulated) in a channel's own unit, over components and blocks of rows; orientations as rotation vectors. Before: re-tuned
+/// nominal model; after: accepted one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ChannelError {
+    /// Channel.
+    pub channel: Kind,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Root mean square.
+    pub before: f64,
+    /// The same.
+    pub after: f64,
+    /// Median of the size: what it is where nothing has gone another way.
+    pub median_before: f64,
+    /// The same.
+    pub median_after: f64,
 }
 
 /// The object from above.
@@ -77,12 +98,14 @@ impl Evidence {
     /// Of the held-out episodes.
     #[must_use]
     pub fn new(kept: &Study, null: &Fit, accepted: &Fit) -> Self {
-        let stack = |fit: &Fit| kept.white(&kept.raw(&fit.model.hypothesis(&fit.x)), fit.model.engine_errors(&fit.x));
-        let [before, after] = [stack(null), stack(accepted)];
+        let raw = [null, accepted].map(|fit| kept.raw(&fit.model.hypothesis(&fit.x)));
+        let [before, after] =
+            [(null, &raw[0]), (accepted, &raw[1])].map(|(fit, raw)| kept.white(raw, fit.model.engine_errors(&fit.x)));
         let trials: Vec<&Trial> = kept.chosen.iter().map(|index| &kept.simulator.trials[*index]).collect();
         let mean_square = |place: &usize| before[*place].norm_squared() / before[*place].len().max(1) as f64;
         let worst = (0..trials.len()).max_by(|a, b| mean_square(a).total_cmp(&mean_square(b)));
-        let mut evidence = Self { residuals: Residuals::new(&trials, [&before, &after]), ..Self::default() };
+        let residuals = Residuals::new(&trials, [&before, &after]);
+        let mut evidence = Self { residuals, errors: errors(&trials, &raw), ..Self::default() };
         let Some(place) = worst else { return evidence };
         let trial = trials[place];
         evidence.episode = Some(trial.id);
@@ -139,6 +162,26 @@ impl Residuals {
         let white_below = rounded(1.96 / (count.max(1) as f64).sqrt());
         Self { count, histogram, autocorrelation, white_below }
     }
+}
+
+/// Of the channels that the log has: raw residuals before and after.
+fn errors(trials: &[&Trial], raw: &[Vec<Vec<f64>>; 2]) -> Vec<ChannelError> {
+    let [before, after] = raw
+        .each_ref()
+        .map(|raw| -> Vec<(Kind, f64)> { trials.iter().zip(raw).flat_map(|(trial, raw)| trial.errors(raw)).collect() });
+    // Root mean square and median.
+    let sizes = |errors: &[(Kind, f64)], channel: Kind| -> [f64; 2] {
+        let mut sizes: Vec<f64> = errors.iter().filter(|(kind, _)| *kind == channel).map(|(_, e)| e.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let squares: f64 = sizes.iter().map(|size| size * size).sum();
+        [(squares / sizes.len().max(1) as f64).sqrt(), sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)]
+    };
+    (Kind::ALL.into_iter().filter(|channel| before.iter().any(|(kind, _)| kind == channel)))
+        .map(|channel| {
+            let [[before, median_before], [after, median_after]] = [&before, &after].map(|list| sizes(list, channel));
+            ChannelError { channel, unit: channel.unit(), before, after, median_before, median_after }
+        })
+        .collect()
 }
 
 /// Σ r(t) r(t + lag) over Σ r², each channel of each episode by itself.

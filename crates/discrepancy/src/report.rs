@@ -124,6 +124,10 @@ pub struct Report {
     pub evidence: Evidence,
     /// What to record next to tell the confusion set apart.
     pub next_experiment: String,
+    /// Seed of the hold-out split, of the bootstrap and of the test of what is left.
+    pub seed: u64,
+    /// Part of how many that was held out, counted from 1, as on the command line; `None`: the share that the log says.
+    pub fold: Option<[usize; 2]>,
     /// Simulated episodes.
     pub rollouts: usize,
     /// Duration, s.
@@ -199,6 +203,8 @@ impl Report {
             retuned: retuned(diagnosis, &samples),
             effects,
             evidence: diagnosis.evidence.clone(),
+            seed: settings.seed,
+            fold: settings.fold.map(|[part, parts]| [part + 1, parts]),
             rollouts: diagnosis.rollouts,
             seconds,
         }

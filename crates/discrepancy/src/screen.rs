@@ -258,6 +258,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_linear_step_moves_what_is_re_tuned_with_the_effect() {
+        // Residuals that are linear in one tunable and one strength, at no noise and with columns far above the prior: the step is exact.
+        let column = |f: fn(f64) -> f64| vec![DVector::from_fn(200, |row, _| 100.0 * f(row as f64))];
+        let (tuning, strength) = (column(|t| (0.1 * t).sin()), column(|t| (0.1 * t).sin() + (0.3 * t).cos()));
+        // Re-tuning alone has gone to 2, where 0.5 less and an effect of 0.7 are right.
+        let residuals = vec![&tuning[0] * 0.5 - &strength[0] * 0.7];
+        let damping = candidate(EffectKind::ViscousDamping);
+        let strengths: Vec<usize> = damping.strengths().collect();
+        let (gain, step) = linear(&damping, &strengths, &[2.0], &residuals, &[tuning], &[strength]);
+        assert!((step[0] + 0.5).abs() < 1e-2 && (step[1] - 0.7).abs() < 1e-2, "{step:?}");
+        assert!(gain > 100.0, "{gain}");
+    }
+
+    fn candidate(kind: EffectKind) -> Candidate {
+        let all = crate::candidate::candidates(&crate::candidate::tests::context());
+        all.into_iter().find(|candidate| candidate.kind() == kind).unwrap()
+    }
+
+    #[test]
     fn what_met_a_body_may_go_another_way_and_what_went_by_may_not() {
         let episode = |size: f64| DVector::from_element(50, size);
         let gain = |before: f64, after: f64| met(&vec![episode(before)], &vec![episode(after)]);

@@ -47,8 +47,8 @@ impl Search<'_> {
         self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
     }
 
-    /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out; the model
-    /// with them, what was compared, and what the model leaves where that is known.
+    /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out or another one
+    /// promises enough; the model with them, what was compared, and what the model leaves where that is known.
     pub(crate) fn effects(
         &mut self,
         screening: &Screening,
@@ -320,9 +320,19 @@ impl Search<'_> {
                 _ => break,
             }
         }
-        // Of what a second effect may be the two nearest are compared with care.
-        if !hasty
-            && let [best, second, ..] = rivals.as_slice()
+        if !hasty {
+            self.compare_nearest(&mut rivals, share, &fully);
+        }
+        first_of_each(&mut rivals, Rival::kind);
+        let mut round = Round { promises, rivals, before: self.heldout(&base), base, hasty };
+        self.tune(&mut round);
+        round
+    }
+
+    /// Fits the rival that is nearest to the best one to all episodes, too: beside another effect, or where the first ones have used up what more than the
+    /// best may cost, it was fitted to those of the screening alone.
+    fn compare_nearest(&self, rivals: &mut Vec<Rival>, share: f64, fully: &dyn Fn(Fit) -> Rival) {
+        if let [best, second, ..] = rivals.as_slice()
             && best.whole
             && !second.whole
             && best.gain - second.gain < NEAR * share
@@ -331,12 +341,8 @@ impl Search<'_> {
         {
             let second = rivals.remove(1);
             rivals.push(fully(second.fit));
-            sort(&mut rivals);
+            sort(rivals);
         }
-        first_of_each(&mut rivals, Rival::kind);
-        let mut round = Round { promises, rivals, before: self.heldout(&base), base, hasty };
-        self.tune(&mut round);
-        round
     }
 
     /// The model without an effect, which knew the episodes of the screening alone, fitted to all. How large errors are is learnt where the model is nearly

@@ -269,6 +269,26 @@ impl Trial {
     }
 }
 
+impl Trial {
+    /// What standardised residuals are in the unit of their channel: the mean of (measured − simulated) over each block.
+    pub(crate) fn errors(&self, residuals: &[f64]) -> Vec<(Kind, f64)> {
+        let present = |block: &Block| {
+            let scalar = self.scalars.iter().find(|s| (s.kind, s.component) == (block.kind, block.component));
+            let rows = block.first..block.end;
+            match (scalar, &self.orientation) {
+                (Some(scalar), _) => (scalar.sigma, scalar.values[rows].iter().flatten().count()),
+                (None, Some((sigma, values))) => (*sigma, values[rows].iter().flatten().count()),
+                (None, None) => (0.0, 1),
+            }
+        };
+        let error = |(block, residual): (&Block, &f64)| {
+            let (sigma, rows) = present(block);
+            (block.kind, residual * sigma / (rows as f64).sqrt())
+        };
+        self.blocks.iter().zip(residuals).map(error).collect()
+    }
+}
+
 fn orientation(reading: &RigReading) -> UnitQuaternion<f64> {
     rotation(reading.object.orientation)
 }

@@ -53,6 +53,11 @@ fn the_report_keeps_its_contract() {
         assert!(report["heldout"][key].is_number(), "{key}");
     }
     assert_eq!(report["heldout"]["unit"], "chi2 per sample");
+    let errors = report["evidence"]["errors"].as_array().unwrap();
+    let position = errors.iter().find(|error| error["channel"] == "object_position").unwrap();
+    assert_eq!(position["unit"], "m");
+    assert!(position["after"].as_f64().unwrap() < position["before"].as_f64().unwrap(), "{position}");
+    assert!(report["seed"] == 1 && report["fold"].is_null());
     assert!(report["next_experiment"].is_string() && report["rollouts"].is_u64() && report["seconds"].is_number());
     assert!(std::fs::read_to_string(out.join("model.toml")).unwrap().contains("table_tilt"));
 }

@@ -155,4 +155,10 @@ fn a_centre_of_mass_above_the_middle_is_named_with_its_height() {
 fn tosses_of_what_the_model_says_lack_nothing() {
     let report = report(&tosses(None));
     assert_eq!(report.verdict, Verdict::None, "{}", report.summary);
+    // Noise alone, and what it makes of the start.
+    let [position, orientation] = report.evidence.errors.as_slice() else { panic!("{:?}", report.evidence.errors) };
+    for (error, noise) in [(position, POSITION_M), (orientation, ORIENTATION_RAD)] {
+        assert!(error.before == error.after && error.median_before > 0.6 * noise, "{error:?}");
+        assert!(error.median_before < 2.0 * noise, "{error:?}");
+    }
 }

@@ -1,8 +1,8 @@
 //! Before and after: held-out episodes, the worst one in plots, and what the residuals look like.
 
-use super::html::{escape, fixed, mean_square, words};
+use super::html::{escape, fixed, mean_square, significant, words};
 use super::svg::{Axis, Plot, strip, strip_labels};
-use crate::evidence::{Course, Evidence, Path, REACH, Residuals};
+use crate::evidence::{ChannelError, Course, Evidence, Path, REACH, Residuals};
 use crate::report::{Report, Verdict};
 
 const KEY: &str = "<p class=\"key\"><i class=\"km\"></i>measured<i class=\"kb\"></i>before: re-tuned nominal<i class=\"ka\"></i>after: with the named effects</p>";
@@ -30,6 +30,7 @@ pub(super) fn before_after(report: &Report) -> String {
     };
     out += key;
     out += &dumbbells(report, same);
+    out += &errors(&report.evidence.errors, same);
     out + &plots(&report.evidence, same)
 }
 
@@ -64,6 +65,41 @@ fn dumbbells(report: &Report, same: bool) -> String {
     }
     out += &format!("<div class=\"row axis\"><span></span><div>{}</div><span></span></div>", strip_labels(&axis, 5));
     out + "<p class=\"soft\">Mean square of the white residuals, logarithmic; dashed: noise.</p>"
+}
+
+/// Errors in units of a ruler: millimetres, milliradians, newtons.
+fn errors(errors: &[ChannelError], same: bool) -> String {
+    if errors.is_empty() {
+        return String::new();
+    }
+    let row = |error: &ChannelError| {
+        let (factor, unit) = match error.unit {
+            "m" => (1e3, "mm"),
+            "rad" => (1e3, "mrad"),
+            unit => (1.0, unit),
+        };
+        let cells = |sizes: [f64; 2]| -> String {
+            let shown = if same { &sizes[..1] } else { &sizes[..] };
+            shown.iter().map(|size| format!("<td>{}</td>", significant(factor * size, 3))).collect()
+        };
+        format!(
+            "<tr><td>{}</td><td>{unit}</td>{}{}</tr>",
+            words(error.channel.name()),
+            cells([error.before, error.after]),
+            cells([error.median_before, error.median_after])
+        )
+    };
+    let heads = if same {
+        "<th>root mean square</th><th>median</th>"
+    } else {
+        "<th>root mean square before</th><th>after</th><th>median before</th><th>after</th>"
+    };
+    let rows: String = errors.iter().map(row).collect();
+    format!(
+        "<h3>Held-out error of each channel</h3><table><tr><th>channel</th><th>unit</th>{heads}</tr>{rows}</table>\
+         <p class=\"soft\">Measured − simulated, over components and blocks of rows, noise of the sensors included; an episode that has gone \
+         another way counts in the root mean square more than in the median.</p>"
+    )
 }
 
 fn plots(evidence: &Evidence, same: bool) -> String {
@@ -115,13 +151,8 @@ fn force(course: &Course, worst: &str, same: bool) -> String {
     }
     let axis =
         ["x", "y", "z"].get(course.component).map_or_else(|| course.component.to_string(), |axis| (*axis).into());
-    let name = course.channel.name();
-    let (component, unit) = match name {
-        "joint_torque" => (format!("joint {}", course.component), "N·m"),
-        "wrist_force" => (axis, "N"),
-        "wrist_torque" => (axis, "N·m"),
-        _ => (axis, "m"),
-    };
+    let (name, unit) = (course.channel.name(), course.channel.unit());
+    let component = if name == "joint_torque" { format!("joint {}", course.component) } else { axis };
     let title = format!("{} {component}, {unit}", words(name));
     let caption = format!("{}, {component}: {worst}.", words(name));
     figure(&plot.finish("A channel over time", "time, s", &title), &caption)

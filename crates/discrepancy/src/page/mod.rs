@@ -94,8 +94,10 @@ fn foot(report: &Report) -> String {
         ("share", "Part of all that is beyond noise."),
     ];
     let lines: String = lines.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{text}</dd>")).collect();
+    let fold = report.fold.map(|[part, parts]| format!(", part {part} of {parts} held out")).unwrap_or_default();
     format!(
-        "<dl>{lines}</dl><p class=\"soft\">{} simulated episodes, {} s. Version {} of the contract of report.json.</p>",
+        "<dl>{lines}</dl><p class=\"soft\">Seed {}{fold}; {} simulated episodes, {} s. Version {} of the contract of report.json.</p>",
+        report.seed,
         report.rollouts,
         fixed(report.seconds, 1),
         report.version

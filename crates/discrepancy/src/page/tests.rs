@@ -1,5 +1,5 @@
 use super::page;
-use crate::evidence::{BINS, Course, Evidence, LAGS, Path, Residuals};
+use crate::evidence::{BINS, ChannelError, Course, Evidence, LAGS, Path, Residuals};
 use crate::locate::Cell;
 use crate::report::{Heldout, NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
 use crate::trial::{Kind, Phase};
@@ -28,6 +28,14 @@ fn evidence() -> Evidence {
             autocorrelation: [vec![0.4; LAGS], vec![0.0; LAGS]],
             white_below: 0.196,
         },
+        errors: vec![ChannelError {
+            channel: Kind::ObjectPosition,
+            unit: "m",
+            before: 0.0123,
+            after: 0.0011,
+            median_before: 0.0042,
+            median_after: 0.0009,
+        }],
     }
 }
 
@@ -79,6 +87,8 @@ fn report(verdict: Verdict) -> Report {
         }],
         evidence: evidence(),
         next_experiment: "Push in eight directions.".into(),
+        seed: 1,
+        fold: None,
         rollouts: 3600,
         seconds: 41.0,
     }
@@ -208,6 +218,23 @@ fn an_unknown_gap_is_described_at_the_top() {
     let html = page("set-003", &report(Verdict::Unknown));
     let first = html.find("wrist_force during sliding").expect("a description");
     assert!(first < html.find("<section").expect("a section"));
+}
+
+#[test]
+fn errors_are_told_in_millimetres() {
+    let html = page("set-003", &report(Verdict::Effect));
+    assert!(
+        html.contains("<td>object position</td><td>mm</td><td>12.3</td><td>1.10</td><td>4.20</td><td>0.900</td>"),
+        "{html}"
+    );
+    assert!(!page("set-003", &report(Verdict::None)).contains("<td>1.10</td>"));
+}
+
+#[test]
+fn the_page_says_what_it_takes_to_have_it_again() {
+    let parted = Report { fold: Some([2, 5]), ..report(Verdict::Effect) };
+    assert!(page("set-003", &parted).contains("Seed 1, part 2 of 5 held out;"));
+    assert!(page("set-003", &report(Verdict::Effect)).contains("Seed 1; 3600 simulated episodes"));
 }
 
 #[test]

@@ -57,6 +57,19 @@ impl Kind {
         }
     }
 
+    /// Unit of a component.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::ObjectPosition | Self::ToolPosition => "m",
+            Self::ObjectOrientation | Self::JointPosition => "rad",
+            Self::ObjectVelocity => "m/s",
+            Self::ObjectSpin => "rad/s",
+            Self::WristForce => "N",
+            Self::WristTorque | Self::JointTorque => "N·m",
+        }
+    }
+
     /// Its scalar columns for an arm with `joints` joints; none for the orientation, which is no sum of columns.
     pub(crate) fn channels(self, joints: usize) -> Vec<Channel> {
         let vector = |make: fn(Axis) -> Channel| Axis::ALL.map(make).to_vec();
