@@ -42,7 +42,9 @@ pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &Nois
             }
         }
     }
-    let (obstacles_m, patches_m) = placed(simulator, null, &theta.object);
+    // Nothing that stands in the way is looked for where nothing pushes, and no forces tell of a patch.
+    let (obstacles_m, patches_m) =
+        if nominal.has_tool() { placed(simulator, null, &theta.object) } else { Default::default() };
     Context {
         world,
         theta,

@@ -80,7 +80,8 @@ impl Settings {
     /// For what is thrown.
     fn thrown(&self) -> Self {
         let effects = if self.effects == 0 { 0 } else { self.effects.max(self.effects_thrown) };
-        Self { effects, ..self.clone() }
+        // A toss has few coordinates: another effect takes less.
+        Self { effects, rollouts: self.most, ..self.clone() }
     }
 }
 

@@ -320,7 +320,8 @@ impl Search<'_> {
                 _ => break,
             }
         }
-        if !hasty {
+        // A third effect is worth more.
+        if !hasty && self.settings.effects == 2 {
             self.compare_nearest(&mut rivals, share, &fully);
         }
         first_of_each(&mut rivals, Rival::kind);
