@@ -135,16 +135,18 @@ impl Candidate {
     /// Coordinates to begin from where a linear step leads nowhere.
     #[must_use]
     pub fn elsewhere(&self) -> Vec<Vec<f64>> {
-        // Every bounce more or less is a ridge; for the kind the stronger step alone asks.
-        if self.kind() == EffectKind::Restitution && self.reach == FAR {
-            return BOUNCES.iter().map(|coefficient| self.coordinates_of(&[*coefficient])).collect();
+        match self.kind() {
+            // Every bounce more or less is a ridge; for the kind the stronger step alone asks.
+            EffectKind::Restitution if self.reach == FAR => {
+                BOUNCES.iter().map(|e| self.coordinates_of(&[*e])).collect()
+            }
+            // What a round object, which slips off its tool, does is no multiple of what a slight anisotropy does, and every axis has its own valley.
+            EffectKind::AnisotropicFriction => {
+                let axes = |a| (0..8).map(move |eighth| [a, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
+                AMPLITUDES.into_iter().flat_map(axes).map(|values| self.coordinates_of(&values)).collect()
+            }
+            _ => Vec::new(),
         }
-        if self.kind() != EffectKind::AnisotropicFriction {
-            return Vec::new();
-        }
-        // What a round object, which slips off its tool, does is no multiple of what a slight anisotropy does, and every axis has its own valley.
-        let axes = |amplitude| (0..8).map(move |eighth| [amplitude, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
-        AMPLITUDES.into_iter().flat_map(axes).map(|values| self.coordinates_of(&values)).collect()
     }
 
     /// Coordinates of the strengths.

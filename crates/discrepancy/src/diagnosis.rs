@@ -122,8 +122,8 @@ pub struct Diagnosis {
     pub nominal: Fit,
     /// The accepted model; the nominal one where nothing was.
     pub model: Fit,
-    /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out and no other promises enough, no more effects are allowed, two were found at once or
-    /// the budget is used up.
+    /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out and no other promises enough, no more effects
+    /// are allowed, two were found at once or the budget is used up.
     pub rounds: Vec<Round>,
     /// Sums of squares of the held-out episodes: nominal and accepted model, with the errors of the accepted one.
     pub heldout: [Vec<f64>; 2],

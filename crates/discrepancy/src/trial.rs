@@ -267,9 +267,7 @@ impl Trial {
         }
         residuals
     }
-}
 
-impl Trial {
     /// What standardised residuals are in the unit of their channel: the mean of (measured − simulated) over each block.
     pub(crate) fn errors(&self, residuals: &[f64]) -> Vec<(Kind, f64)> {
         let present = |block: &Block| {

@@ -1,38 +1,22 @@
 //! Rigs of measured logs against closed forms, and what a program that fits them counts on.
 
+#[path = "support/rigs.rs"]
+mod rigs;
 mod support;
 
 use std::sync::Arc;
 
-use physics_model::config::{ObstacleMobility, WorldConfig};
+use physics_model::config::ObstacleMobility;
 use physics_model::effect::{Effect, EffectKind};
 use physics_model::rig::{Prism, Rig, RigError, RigObject, RigReading, RigShape, RigStart, RigTool};
 use physics_model::world::Divergence;
 use physics_model::{BodyState, ObjectShape};
+use rigs::{G, rig};
 
-const G: f64 = 9.81;
 const MU: f64 = 0.3;
 const MASS_KG: f64 = 0.5;
 const SIZE_M: [f64; 3] = [0.08, 0.06, 0.05];
 const BALL_M: f64 = 0.02;
-
-fn rig(tool: RigTool) -> Rig {
-    let world = WorldConfig {
-        control_period_secs: 0.005,
-        control_steps: 1,
-        solver_iterations: 2,
-        contact_frequency_hz: 60.0,
-        contact_damping_ratio: 5.0,
-        table_height_m: 0.0,
-        gravity_mps2: G,
-        tool_friction: 0.1,
-        obstacle_friction: 0.5,
-        arm_stiffness_npm: 50_000.0,
-        restitution: 0.0,
-        obstacle_mobility: ObstacleMobility::Fixed,
-    };
-    Rig { world, tick_steps: 2, tool, tool_slip_mps: 0.0 }
-}
 
 fn ball() -> Rig {
     rig(RigTool::Ball { radius_m: BALL_M })

@@ -1,30 +1,14 @@
 //! Round edges of what is thrown, against closed forms.
 
-use physics_model::config::{ObstacleMobility, WorldConfig};
+#[path = "support/rigs.rs"]
+mod rigs;
+
 use physics_model::effect::{Effect, EffectKind};
-use physics_model::rig::{Rig, RigObject, RigShape, RigStart, RigTool};
+use physics_model::rig::{RigObject, RigShape, RigStart, RigTool};
 use physics_model::{BodyState, ObjectShape};
+use rigs::{G, rig};
 
-const G: f64 = 9.81;
 const TICK_SECS: f64 = 0.01;
-
-fn rig() -> Rig {
-    let world = WorldConfig {
-        control_period_secs: 0.5 * TICK_SECS,
-        control_steps: 1,
-        solver_iterations: 2,
-        contact_frequency_hz: 60.0,
-        contact_damping_ratio: 5.0,
-        table_height_m: 0.0,
-        gravity_mps2: G,
-        tool_friction: 0.1,
-        obstacle_friction: 0.5,
-        arm_stiffness_npm: 50_000.0,
-        restitution: 0.0,
-        obstacle_mobility: ObstacleMobility::Fixed,
-    };
-    Rig { world, tick_steps: 2, tool: RigTool::None, tool_slip_mps: 0.0 }
-}
 
 #[test]
 fn round_edges_and_corners_meet_the_table_lower() {
@@ -46,7 +30,8 @@ fn round_edges_and_corners_meet_the_table_lower() {
                 let mut from = BodyState::at_rest([0.0; 3], 0.0);
                 from.orientation = [axis[0] * sin, axis[1] * sin, 0.0, cos];
                 from.position_m[2] = height(radius) + above_m;
-                let readings = rig().run(&cube, &effects, &RigStart::of_episode(from, None), &[[0.0; 3]]).unwrap();
+                let readings =
+                    rig(RigTool::None).run(&cube, &effects, &RigStart::of_episode(from, None), &[[0.0; 3]]).unwrap();
                 readings[0].object.linear_mps[2]
             };
             // Free 1 mm above where it touches, held 0.1 mm below.
