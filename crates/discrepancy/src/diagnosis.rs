@@ -64,7 +64,7 @@ pub struct Settings {
     /// The same of a single held-out one above which nothing is not the whole story either.
     pub odd: f64,
     /// Chance that some channel in some phase would stand out as much under a right model, below which another effect is looked for even
-    /// if none promises enough.
+    /// if none promises enough; above it episodes with gaps are odd ones.
     pub another: f64,
     /// Chance that some channel in some phase would stand out as much under a right model, below which what is left is no chance.
     pub left_by_chance: f64,
@@ -98,7 +98,7 @@ impl Default for Settings {
             threshold: 10.0,
             threshold_rolling: 20.0,
             effects: 2,
-            effects_thrown: 3,
+            effects_thrown: 4,
             rollouts: 4000,
             most: 4300,
             limit: 4800,

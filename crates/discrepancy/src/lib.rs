@@ -33,6 +33,7 @@
 mod accept;
 mod begin;
 pub mod candidate;
+mod chain;
 mod context;
 pub mod diagnosis;
 mod error;

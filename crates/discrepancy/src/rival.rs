@@ -14,7 +14,7 @@ pub struct Rival {
     pub whole: bool,
     /// ln evidence over that of the model without; of what was fitted to the episodes of the screening alone what that promises for all.
     pub gain: f64,
-    /// Sums of squares of the held-out episodes.
+    /// Sums of squares of the held-out episodes; empty where nothing is decided by them.
     pub heldout: Vec<f64>,
 }
 

@@ -12,6 +12,8 @@ use crate::study::{Study, difference};
 
 /// Episodes that the screening looks at, at most.
 const EPISODES: usize = 10;
+/// The same of what is thrown, which lacks several effects: each toss meets the table more than once.
+const EPISODES_THROWN: usize = 8;
 /// Mean square of an episode that is explained.
 const EXPLAINED: f64 = 1.4;
 /// An episode lasts long if it does so many times as long as the mean.
@@ -178,7 +180,8 @@ pub(crate) fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
     order.sort_by(|a, b| failure(&groups[*b]).total_cmp(&failure(&groups[*a])));
     let worst = order.iter().copied().find(|group| long(&groups[*group]));
     order.retain(|group| !long(&groups[*group]) || Some(*group) == worst);
-    let count = order.len().min(EPISODES);
+    let most = if study.simulator.nominal.has_tool() { EPISODES } else { EPISODES_THROWN };
+    let count = order.len().min(most);
     let mut places: Vec<usize> = (0..count).flat_map(|i| groups[order[i * order.len() / count]].clone()).collect();
     places.sort_unstable();
     places

@@ -6,6 +6,7 @@ use physics_model::{EffectConfig, EffectKind};
 use crate::accept::{Asked, Episodes, NEGLIGIBLE, better_heldout, both_convince, convinces, lasts, may_convince};
 use crate::begin::{begin, follow, shake};
 use crate::candidate::Candidate;
+use crate::chain::Link;
 use crate::diagnosis::Settings;
 use crate::fit::{Begin, Effort, Fit, STEPS, cost, fit};
 use crate::likelihood::{mean_square, trimmed_mean};
@@ -58,8 +59,13 @@ impl Search<'_> {
         let settings = self.settings;
         let (mut accepted, mut rounds, mut explained, mut remaining) = (null.clone(), Vec::new(), 0.0, None);
         let within = |search: &Self| search.study.simulator.rollouts() <= settings.rollouts;
+        let mut links = if settings.effects > 2 { self.chain(screening, null) } else { Vec::new() };
+        if let Some((accepted, rounds)) = self.together(screening, null, &links, episodes) {
+            return (accepted, rounds, None);
+        }
+        links.truncate(1);
         while rounds.is_empty() || (accepted.model.parts.len() < settings.effects && within(self)) {
-            let mut round = self.round(screening, &accepted);
+            let mut round = self.round(screening, &accepted, links.pop());
             let mut found = settings.effects > 0 && self.choose(&mut round, episodes, explained);
             if !found && round.hasty {
                 if let Some(pair) = self.both(screening, &mut round, episodes) {
@@ -114,7 +120,7 @@ impl Search<'_> {
     }
 
     /// What is asked of an effect beside others that gained so much.
-    fn asked(&self, explained: f64) -> Asked {
+    pub(crate) fn asked(&self, explained: f64) -> Asked {
         let rolls = self.study.simulator.nominal.rolls();
         let threshold = if rolls { self.settings.threshold_rolling } else { self.settings.threshold };
         // The errors of a solver grow with what it is asked to explain.
@@ -129,7 +135,7 @@ impl Search<'_> {
             return None;
         }
         let Rival { fit, gain, .. } = round.rivals[first].clone();
-        let mut second = self.round(screening, &fit);
+        let mut second = self.round(screening, &fit, None);
         if !self.choose(&mut second, episodes, gain) || !both_convince([round, &second], episodes, asked) {
             return None;
         }
@@ -208,12 +214,12 @@ impl Search<'_> {
     }
 
     /// How many times as much all episodes say as those of the screening.
-    fn share(&self, screening: &Screening) -> f64 {
+    pub(crate) fn share(&self, screening: &Screening) -> f64 {
         self.study.chosen.len() as f64 / screening.places.len() as f64
     }
 
     /// Whether a quick fit of a model to the episodes of a study is within the budget.
-    fn affords(&self, study: &Study, model: &Model) -> bool {
+    pub(crate) fn affords(&self, study: &Study, model: &Model) -> bool {
         self.study.simulator.affords((model.simulated() + STEPS + 1) * study.rollouts())
     }
 
@@ -249,13 +255,19 @@ impl Search<'_> {
         promises
     }
 
-    /// Compares what could be added to `base`, which in the first round knows the episodes of the screening alone.
-    fn round(&mut self, screening: &Screening, base: &Fit) -> Round {
+    /// What could be added to `base`, which knows the episodes of the screening alone, as `part` does.
+    pub(crate) fn link(&self, screening: &Screening, part: &Study, base: &Fit) -> Link {
+        let promises = self.promises(screening, part, base);
+        let quick = self.quick(screening, part, base, &promises);
+        Link { promises, quick, base: base.clone(), holds: false }
+    }
+
+    /// Compares what could be added to `base`, which in the first round knows the episodes of the screening alone. `known`: what those say already.
+    fn round(&mut self, screening: &Screening, base: &Fit, known: Option<Link>) -> Round {
         let first = base.model.parts.is_empty();
         let part = if first { self.part.clone() } else { self.study.part(&screening.places) };
         let begin = if first { base.clone() } else { base.part(&screening.places) };
-        let promises = self.promises(screening, &part, &begin);
-        let mut quick = self.quick(screening, &part, &begin, &promises);
+        let Link { promises, mut quick, .. } = known.unwrap_or_else(|| self.link(screening, &part, &begin));
         let before = begin.log_evidence();
         let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
         of_first(&mut quick, self.settings.fits, added_kind);
@@ -350,12 +362,16 @@ impl Search<'_> {
     /// right: with what explains most, if that gains much.
     fn without_effect(&mut self, base: &Fit, best: Option<&Fit>) -> Fit {
         let best = best.filter(|best| best.log_evidence() - base.log_evidence() > FAR);
-        let right = best.unwrap_or(base);
+        self.learn_errors(best.unwrap_or(base));
+        let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
+        fit(&self.study, base.model.clone(), Begin::at(&base.x), effort)
+    }
+
+    /// Learns in all episodes how large errors are where a model is right.
+    pub(crate) fn learn_errors(&mut self, right: &Fit) {
         let hypothesis = right.model.hypothesis(&right.x);
         self.study.learn_errors(&hypothesis);
         self.kept.learn_errors(&hypothesis);
-        let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
-        fit(&self.study, base.model.clone(), Begin::at(&base.x), effort)
     }
 
     /// Fits the model without an effect again where that can do what the first rival does.
@@ -473,7 +489,7 @@ fn is_there(fit: &Fit) -> bool {
 }
 
 /// Kind of a fit's last effect.
-fn added_kind(fit: &Fit) -> Option<EffectKind> {
+pub(crate) fn added_kind(fit: &Fit) -> Option<EffectKind> {
     fit.model.parts.last().map(Candidate::kind)
 }
 

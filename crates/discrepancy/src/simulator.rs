@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics_model::effect::Effect;
 use physics_model::rig::{RigReading, RigStart};
 use physics_model::world::Wrench;
@@ -32,6 +33,10 @@ pub struct Nudge {
     pub linear: [f64; 3],
     /// Angular velocities about x, y, z.
     pub angular: [f64; 3],
+    /// Along base z (m) and about x and y (rad): of what does not stand on the table.
+    pub lift: [f64; 3],
+    /// By how much the table is higher (m), and turned about x and y (rad), where this episode meets it; in units, not in standard deviations.
+    pub table: [f64; 3],
 }
 
 /// Simulates episodes and counts them.
@@ -113,8 +118,9 @@ impl<'a> Simulator<'a> {
         let body = nudged(&trial.start, &trial.start_stddev, nudge);
         let start = RigStart::of_episode(body, trial.tool_m);
         // What went wrong on the way is as far from what was measured as the rest of the episode is.
-        let readings =
+        let mut readings =
             rig.run(&object, &effects, &start, &trial.commands).unwrap_or_else(|error| error.readings().to_vec());
+        readings.iter_mut().for_each(|reading| reading.object = raised(&reading.object, nudge.table));
         let first = RigReading {
             tool_m: trial.tool_m,
             joints_rad: Default::default(),
@@ -149,5 +155,41 @@ fn nudged(start: &BodyState, stddev: &[f64; 4], nudge: Nudge) -> BodyState {
         // Turned about the base's z: (cos + sin k) q.
         body.orientation = [cos * x - sin * y, cos * y + sin * x, cos * z + sin * w, cos * w - sin * z];
     }
-    body
+    let [up, about_x, about_y] = nudge.lift;
+    body = raised(&body, [up * position, about_x * orientation, about_y * orientation]);
+    // To a table that is higher the object is lower. It falls and turns as before: only where it comes to lie differs.
+    raised(&body, nudge.table.map(|value| -value))
+}
+
+/// A body that is higher (m) and turned about base x and y (rad) in its place.
+fn raised(body: &BodyState, [up, about_x, about_y]: [f64; 3]) -> BodyState {
+    if [up, about_x, about_y] == [0.0; 3] {
+        return *body;
+    }
+    let [x, y, z, w] = body.orientation;
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0));
+    let q = turn * UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+    let [x, y, height] = body.position_m;
+    BodyState { position_m: [x, y, height + up], orientation: [q.i, q.j, q.k, q.w], ..*body }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_higher_table_is_a_lower_object_that_is_read_where_it_was() {
+        let mut body = BodyState::at_rest([0.1, 0.2, 0.3], 0.4);
+        body.linear_mps = [1.0, 0.0, -1.0];
+        let table = [0.001, 0.02, -0.01];
+        let lower = nudged(&body, &[0.0; 4], Nudge { table, ..Nudge::default() });
+        assert!((lower.position_m[2] - 0.299).abs() < 1e-12 && lower.linear_mps == body.linear_mps);
+        let read = raised(&lower, table);
+        let off = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off(&read.position_m, &body.position_m) < 1e-12 && off(&read.orientation, &body.orientation) < 1e-12);
+        // Its start is turned the other way about x.
+        let [x, ..] =
+            nudged(&BodyState::at_rest([0.0; 3], 0.0), &[0.0; 4], Nudge { table, ..Nudge::default() }).orientation;
+        assert!((x + 0.01).abs() < 1e-4, "{x}");
+    }
 }

@@ -21,13 +21,13 @@ const ORIENTATION_RAD: f64 = 0.000_5;
 
 /// Steps half as long as the model's, solved with more iterations and stiffer contacts.
 fn rig() -> Rig {
-    let steps = 8;
+    let steps = 16;
     let world = WorldConfig {
         control_period_secs: PERIOD_SECS / f64::from(steps),
         control_steps: 1,
         solver_iterations: 6,
-        contact_frequency_hz: 70.0,
-        contact_damping_ratio: 5.0,
+        contact_frequency_hz: 240.0,
+        contact_damping_ratio: 1.2,
         table_height_m: 0.0,
         gravity_mps2: 9.81,
         tool_friction: 0.2,
@@ -99,7 +99,7 @@ fn append(episode: &mut Episode, body: &BodyState, rng: &mut Rng) {
     }
 }
 
-fn tosses(hidden: Option<(EffectKind, &[f64])>) -> Log {
+fn tosses(hidden: &[(EffectKind, &[f64])]) -> Log {
     let effects: Vec<Box<dyn Effect>> =
         hidden.iter().map(|(kind, values)| kind.from_parameters(values).unwrap().build()).collect();
     let shape = RigShape::Solid { shape: ObjectShape::Box, size_m: [SIDE_M; 3] };
@@ -133,7 +133,7 @@ fn found(report: &Report, effect: &str, key: &str) -> (f64, [f64; 2]) {
 
 #[test]
 fn round_edges_are_named_with_their_radius() {
-    let report = report(&tosses(Some((EffectKind::EdgeRounding, &[0.006]))));
+    let report = report(&tosses(&[(EffectKind::EdgeRounding, &[0.006])]));
     assert_eq!(report.effects[0].name, "edge_rounding", "{}", report.summary);
     let (radius_m, [low, high]) = found(&report, "edge_rounding", "radius_m");
     assert!((radius_m - 0.006).abs() < 0.0005 && low < high, "{radius_m} [{low}, {high}]");
@@ -145,7 +145,7 @@ fn round_edges_are_named_with_their_radius() {
 
 #[test]
 fn a_centre_of_mass_above_the_middle_is_named_with_its_height() {
-    let report = report(&tosses(Some((EffectKind::ComOffset, &[0.0, 0.0, 0.08]))));
+    let report = report(&tosses(&[(EffectKind::ComOffset, &[0.0, 0.0, 0.08])]));
     assert_eq!(report.effects[0].name, "com_offset", "{}", report.summary);
     let (share, _) = found(&report, "com_offset", "share_z");
     assert!((share - 0.08).abs() < 0.01, "{share}");
@@ -153,7 +153,7 @@ fn a_centre_of_mass_above_the_middle_is_named_with_its_height() {
 
 #[test]
 fn tosses_of_what_the_model_says_lack_nothing() {
-    let report = report(&tosses(None));
+    let report = report(&tosses(&[]));
     assert_eq!(report.verdict, Verdict::None, "{}", report.summary);
     // Noise alone, and what it makes of the start.
     let [position, orientation] = report.evidence.errors.as_slice() else { panic!("{:?}", report.evidence.errors) };
@@ -161,4 +161,24 @@ fn tosses_of_what_the_model_says_lack_nothing() {
         assert!(error.before == error.after && error.median_before > 0.6 * noise, "{error:?}");
         assert!(error.median_before < 2.0 * noise, "{error:?}");
     }
+}
+
+#[test]
+fn four_effects_that_hide_each_other_are_named_together() {
+    let hidden: [(EffectKind, &[f64], &str); 4] = [
+        (EffectKind::PoseScale, &[0.98], "scale"),
+        (EffectKind::EdgeRounding, &[0.005], "radius_m"),
+        (EffectKind::Restitution, &[0.3], "coefficient"),
+        (EffectKind::ComOffset, &[0.0, 0.0, 0.05], "share_z"),
+    ];
+    let report = report(&tosses(&hidden.map(|(kind, values, _)| (kind, values))));
+    assert_eq!(report.effects.len(), hidden.len(), "{}", report.summary);
+    for (kind, values, key) in hidden {
+        let (value, [low, high]) = found(&report, kind.name(), key);
+        let truth = values[values.len() - 1];
+        assert!(low < value && value < high, "{value} [{low}, {high}]");
+        assert!((value - truth).abs() < 0.1 * truth.abs().min(0.2), "{key}: {value}, {truth}");
+    }
+    assert!(report.heldout.after < 0.5 * report.heldout.before, "{:?}", report.heldout);
+    assert!(report.rollouts <= 5000, "{}", report.rollouts);
 }

@@ -133,7 +133,7 @@ fn header() -> Header {
             shape: Shape::Box { size_m: [Number::Fixed(0.1048); 3] },
             mass_kg: 0.37.into(),
             com_m: [Number::Fixed(0.0); 3],
-            inertia_kgm2: Some([Number::Fixed(0.00081); 3]),
+            inertia_kgm2: Some([Number::Uncertain { mean: 0.00081, stddev: 0.00013 }; 3]),
             restitution: Some(0.125.into()),
         },
         noise: Noise::default(),
@@ -160,7 +160,13 @@ fn notes() -> Notes {
         ("object.size_m", text("Twice the authors' half-width, 0.0524 m.")),
         ("object.mass_kg", text("The authors' model; free tosses do not tell the mass, so it is fixed.")),
         ("object.com_m", text("The authors' model takes the centre.")),
-        ("object.inertia_kgm2", text("The authors' model; a uniform cube would have 0.00068.")),
+        (
+            "object.inertia_kgm2",
+            text(
+                "The authors' model. Nobody says how it was found; a solid cube of this mass has 0.00068, one of thin walls 0.00113\n\
+                 (5/18 m a^2): the stddev is that of a uniform distribution between the two.",
+            ),
+        ),
         ("object.restitution", text("The authors' model.")),
         ("noise.[]", text("None is published.")),
         ("split.holdout_fraction", text("A choice of this import.")),
