@@ -42,7 +42,7 @@ pub struct Settings {
     pub confusion: f64,
     /// What an effect has to gain in ln evidence to be named.
     pub threshold: f64,
-    /// The same for what rolls: a ball goes another way at the least provocation.
+    /// The same for what rolls and for what is thrown: they go another way at the least provocation.
     pub threshold_rolling: f64,
     /// Effects at most.
     pub effects: usize,
@@ -80,8 +80,8 @@ impl Settings {
     /// For what is thrown.
     fn thrown(&self) -> Self {
         let effects = if self.effects == 0 { 0 } else { self.effects.max(self.effects_thrown) };
-        // A toss has few coordinates: another effect takes less.
-        Self { effects, rollouts: self.most, ..self.clone() }
+        // A toss has few coordinates: another effect takes less. Whatever bounces goes another way at the least provocation, too.
+        Self { effects, rollouts: self.most, threshold: self.threshold.max(self.threshold_rolling), ..self.clone() }
     }
 }
 
@@ -94,7 +94,8 @@ impl Default for Settings {
             fits: 3,
             begins: 5,
             confusion: 20.0_f64.ln(),
-            // Of 28 simulated logs without an effect, 20 of boxes and cylinders gained up to 5, 8 of balls up to 17 by what else convinced.
+            // Of 28 simulated logs without an effect, 20 of boxes and cylinders gained up to 5, 8 of balls up to 17 by what else convinced; of 27 of tosses one
+            // gained 10.
             threshold: 10.0,
             threshold_rolling: 20.0,
             effects: 2,
