@@ -316,7 +316,7 @@ fn retuned(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<Retuned> {
 
 fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -> String {
     let names: Vec<&str> = effects.iter().map(|effect| effect.name).collect();
-    let comes = if names.len() > 1 { "come" } else { "comes" };
+    let (comes, it) = if names.len() > 1 { ("come", "them") } else { ("comes", "it") };
     let names = match names.as_slice() {
         [before @ .., first, last] => [before, &[&format!("{first} and {last}")]].concat().join(", "),
         names => names.concat(),
@@ -326,7 +326,7 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
             // What few episodes meet may leave the others as they were, or hit one of them harder.
             let goes = if after < before { "falls" } else { "goes" };
             format!(
-                "The model lacks {names}: with it the held-out error {goes} from {before:.2} to {after:.2} (1 is noise)."
+                "The model lacks {names}: with {it} the held-out error {goes} from {before:.2} to {after:.2} (1 is noise)."
             )
         }
         Verdict::None => {
@@ -339,7 +339,7 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
         }
         Verdict::Unknown => format!(
             "Something is missing that no effect of the catalogue explains; {names} {comes} nearest: held-out error {before:.2}, \
-             with it {after:.2} (1 is noise)."
+             with {it} {after:.2} (1 is noise)."
         ),
     }
 }
