@@ -5,8 +5,6 @@
 //! episodes of the screening alone, as long as one lasts there; where all of them are, errors are learnt, and what they make together is fitted to all
 //! episodes and has to convince there. If it does not, the last one is dropped.
 
-use physics_model::EffectKind;
-
 use crate::accept::{Episodes, convinces, lasts};
 use crate::fit::{Begin, Effort, Fit, STEPS, fit};
 use crate::model::Model;
@@ -48,8 +46,12 @@ impl Link {
 impl Search<'_> {
     /// Looks for several effects beside the nominal model `null`, which knows the episodes of the screening alone: what each link compared, the last of
     /// which may have found nothing.
-    pub(crate) fn chain(&self, screening: &Screening, null: &Fit) -> Vec<Link> {
+    pub(crate) fn chain(&mut self, screening: &Screening, null: &Fit) -> Vec<Link> {
         let (mut links, mut gained) = (Vec::new(), 0.0);
+        // What is done with them in the end: to learn errors, and to fit the model without them.
+        let simulations = self.study.simulations_to_learn();
+        self.reserve = simulations * (self.study.rollouts() + self.kept.rollouts())
+            + (null.model.tunables + STEPS + 1) * self.study.rollouts();
         let (mut part, mut at) = (self.part.clone(), null.clone());
         while at.model.parts.len() < self.settings.effects && self.affords_one_more(&part, &at.model) {
             if at.model.parts.len() == LEAST {
@@ -58,10 +60,6 @@ impl Search<'_> {
                 at = fit(&part, at.model, Begin::at(&at.x), Effort::Quick);
             }
             let mut link = self.link(screening, &part, &at);
-            if !at.model.parts.is_empty() {
-                // Friction is re-tuned with everything else.
-                link.quick.retain(|fit| added_kind(fit) != Some(EffectKind::FrictionLevel));
-            }
             let gain = self.share(screening) * link.gain();
             let least = self.asked(gained).least.max(LEAST_SHARE * gained);
             link.holds = gain > least && link.quick.first().is_some_and(|best| self.lasts_in(best, &part));
@@ -73,16 +71,23 @@ impl Search<'_> {
             }
             gained += gain;
         }
+        self.reserve = 0;
         links
+    }
+
+    /// What could be added to `base`, which knows the episodes of the screening alone, as `part` does.
+    pub(crate) fn link(&self, screening: &Screening, part: &Study, base: &Fit) -> Link {
+        let promises = self.promises(screening, part, base);
+        let quick = self.quick(screening, part, base, &promises);
+        Link { promises, quick, base: base.clone(), holds: false }
     }
 
     /// Whether the budget suffices to look for an effect beside those of a model, and for what they come to together.
     fn affords_one_more(&self, part: &Study, model: &Model) -> bool {
         let coordinates = model.simulated() + COORDINATES;
         let looked = KINDS * (coordinates + STEPS + 1) + part.simulations_to_learn();
-        let learnt = self.study.simulations_to_learn() * (self.study.rollouts() + self.kept.rollouts());
-        let fitted = (model.tunables + coordinates + 2 * (STEPS + 1)) * self.study.rollouts();
-        self.study.simulator.affords(looked * part.rollouts() + learnt + fitted)
+        let fitted = (coordinates + STEPS + 1) * self.study.rollouts();
+        self.study.simulator.affords(looked * part.rollouts() + fitted + self.reserve)
     }
 
     fn lasts_in(&self, fit: &Fit, study: &Study) -> bool {
@@ -116,7 +121,7 @@ impl Search<'_> {
             Round { promises: Vec::new(), rivals: Vec::new(), base: base.clone(), before: before.clone(), hasty: true };
         for (place, begin) in found.into_iter().enumerate().rev() {
             if !self.affords(&self.study, &begin.model) {
-                break;
+                continue;
             }
             let fit = fit(&self.study, begin.model.clone(), Begin::at(&begin.x), self.effort(&begin.model));
             let gain = fit.log_evidence() - base.log_evidence();

@@ -124,7 +124,7 @@ pub struct Diagnosis {
     /// The accepted model; the nominal one where nothing was.
     pub model: Fit,
     /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out and no other promises enough, no more effects
-    /// are allowed, two were found at once or the budget is used up.
+    /// are allowed, several were found at once or the budget is used up.
     pub rounds: Vec<Round>,
     /// Sums of squares of the held-out episodes: nominal and accepted model, with the errors of the accepted one.
     pub heldout: [Vec<f64>; 2],
@@ -175,7 +175,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let context = context(&simulator, &null, log, &noise);
     let screening = Screening::new(&part, places, &null, &candidates(&context));
     let kept = Study::new(&simulator, engine, heldout);
-    let mut search = Search { study, kept, part, settings };
+    let mut search = Search { study, kept, part, settings, reserve: 0 };
 
     let episodes = Episodes {
         fitted: search.study.groups(),

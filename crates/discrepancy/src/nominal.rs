@@ -17,8 +17,8 @@ const LONGEST_STEP_SECS: f64 = 1.0 / 60.0;
 /// Friction of tool and object where the log does not say.
 const TOOL_FRICTION: f64 = 0.2;
 
-/// What is thrown: engine steps a tick, 0.8 ms at 148 Hz.
-const THROWN_REFINEMENT: u32 = 8;
+/// Engine step, s, of what is thrown, at most: an eighth of a tick at 148 Hz.
+const THROWN_STEP_SECS: f64 = 0.000_85;
 /// Its contacts are rigid as far as a camera sees: hard things part within milliseconds, 0.8 ms being 1 / (2π · 200 Hz). The planner's softer ones would
 /// hide much of what an impact shows.
 const THROWN_FREQUENCY_HZ: f64 = 200.0;
@@ -185,11 +185,25 @@ impl Nominal {
             return Engine::default();
         }
         Engine {
-            refinement: THROWN_REFINEMENT,
+            refinement: (self.step_secs() / THROWN_STEP_SECS - 1e-9).ceil().max(1.0) as u32,
             contact_frequency_hz: THROWN_FREQUENCY_HZ,
             contact_damping_ratio: THROWN_DAMPING_RATIO,
             ..Engine::default()
         }
+    }
+
+    /// Engine steps a tick, before refinement.
+    fn steps(&self) -> u32 {
+        (self.header.period_secs / LONGEST_STEP_SECS - 1e-9).ceil().max(1.0) as u32
+    }
+
+    fn step_secs(&self) -> f64 {
+        self.header.period_secs / f64::from(self.steps())
+    }
+
+    /// Whether re-tuning may change a number of the log.
+    pub(crate) fn tunes(&self, key: &str) -> bool {
+        self.tunables.iter().any(|tunable| tunable.key == key)
     }
 
     /// Whether the object rolls.
@@ -215,7 +229,7 @@ impl Nominal {
     #[must_use]
     pub fn rig(&self, z: &[f64], engine: &Engine) -> Rig {
         let header = &self.header;
-        let steps = (header.period_secs / LONGEST_STEP_SECS - 1e-9).ceil().max(1.0) as u32 * engine.refinement;
+        let steps = self.steps() * engine.refinement;
         let tool_friction = match header.tool_friction {
             Some(number) => self.value(z, Place::ToolFriction, number),
             None => TOOL_FRICTION,

@@ -37,7 +37,7 @@ pub struct Round {
     pub promises: Vec<Promise>,
     /// The fitted ones, the most probable first.
     pub rivals: Vec<Rival>,
-    /// The model that they were added to, with the same errors.
+    /// The model that they were added to, with the same errors; of several effects that were fitted together the nominal one.
     pub base: Fit,
     /// Sums of squares of the held-out episodes under that model.
     pub before: Vec<f64>,

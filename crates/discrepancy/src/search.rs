@@ -39,6 +39,8 @@ pub(crate) struct Search<'a> {
     pub(crate) part: Study<'a>,
     /// What it may do.
     pub(crate) settings: &'a Settings,
+    /// Simulated episodes that something later needs.
+    pub(crate) reserve: usize,
 }
 
 impl Search<'_> {
@@ -226,7 +228,7 @@ impl Search<'_> {
     /// Whether it is, and after it one to all episodes.
     fn affords_both(&self, part: &Study, model: &Model) -> bool {
         let rollouts = part.rollouts() + self.study.rollouts();
-        self.study.simulator.affords((model.simulated() + STEPS + 1) * rollouts)
+        self.study.simulator.affords((model.simulated() + STEPS + 1) * rollouts + self.reserve)
     }
 
     /// What a model leaves, by channel and phase.
@@ -247,19 +249,16 @@ impl Search<'_> {
     }
 
     /// What promises most beside the effects of a model, which knows the episodes of the screening alone, as `part` does.
-    fn promises(&self, screening: &Screening, part: &Study, fit: &Fit) -> Vec<Promise> {
+    pub(crate) fn promises(&self, screening: &Screening, part: &Study, fit: &Fit) -> Vec<Promise> {
         let mut promises = screening.promises(part, fit, self.study.chosen.len());
         // What is there already is fitted with it; a second patch or body is another one.
         let there: Vec<EffectKind> = fit.model.parts.iter().map(Candidate::kind).collect();
         promises.retain(|promise| promise.candidate.tied_to_a_place() || !there.contains(&promise.candidate.kind()));
+        // In a chain friction is re-tuned with everything else.
+        if self.settings.effects > 2 && !there.is_empty() && self.study.simulator.nominal.tunes("table.friction") {
+            promises.retain(|promise| promise.candidate.kind() != EffectKind::FrictionLevel);
+        }
         promises
-    }
-
-    /// What could be added to `base`, which knows the episodes of the screening alone, as `part` does.
-    pub(crate) fn link(&self, screening: &Screening, part: &Study, base: &Fit) -> Link {
-        let promises = self.promises(screening, part, base);
-        let quick = self.quick(screening, part, base, &promises);
-        Link { promises, quick, base: base.clone(), holds: false }
     }
 
     /// Compares what could be added to `base`, which in the first round knows the episodes of the screening alone. `known`: what those say already.
@@ -425,7 +424,7 @@ impl Search<'_> {
     }
 
     /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.
-    fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
+    pub(crate) fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
         let before = base.log_evidence();
         let share = self.share(screening);
         let (mut quick, mut gained, mut kinds) = (Vec::<Fit>::new(), 0.0_f64, Vec::new());

@@ -33,7 +33,7 @@ pub struct Nudge {
     pub linear: [f64; 3],
     /// Angular velocities about x, y, z.
     pub angular: [f64; 3],
-    /// Along base z (m) and about x and y (rad): of what does not stand on the table.
+    /// Along base z (m) and about x and y (rad): what is thrown may be anywhere.
     pub lift: [f64; 3],
     /// By how much the table is higher (m), and turned about x and y (rad), where this episode meets it; in units, not in standard deviations.
     pub table: [f64; 3],
@@ -126,7 +126,7 @@ impl<'a> Simulator<'a> {
             joints_rad: Default::default(),
             wrench: Wrench::default(),
             joint_torque_nm: Default::default(),
-            object: body,
+            object: raised(&body, nudge.table),
             hidden: Vec::new(),
         };
         (first, readings)
@@ -158,7 +158,16 @@ fn nudged(start: &BodyState, stddev: &[f64; 4], nudge: Nudge) -> BodyState {
     let [up, about_x, about_y] = nudge.lift;
     body = raised(&body, [up * position, about_x * orientation, about_y * orientation]);
     // To a table that is higher the object is lower. It falls and turns as before: only where it comes to lie differs.
-    raised(&body, nudge.table.map(|value| -value))
+    let table = nudge.table.map(|value| -value);
+    body = raised(&body, table);
+    if table != [0.0; 3] {
+        body.angular_rps = (turn(table) * Vector3::from(body.angular_rps)).into();
+    }
+    body
+}
+
+fn turn([_, about_x, about_y]: [f64; 3]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0))
 }
 
 /// A body that is higher (m) and turned about base x and y (rad) in its place.
@@ -167,8 +176,7 @@ fn raised(body: &BodyState, [up, about_x, about_y]: [f64; 3]) -> BodyState {
         return *body;
     }
     let [x, y, z, w] = body.orientation;
-    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(about_x, about_y, 0.0));
-    let q = turn * UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
+    let q = turn([up, about_x, about_y]) * UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
     let [x, y, height] = body.position_m;
     BodyState { position_m: [x, y, height + up], orientation: [q.i, q.j, q.k, q.w], ..*body }
 }
