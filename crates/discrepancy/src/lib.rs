@@ -11,7 +11,8 @@
 //! 4. Every effect of the catalogue gets one linear step beside re-tuning ([`screen`]); what promises most is fitted ([`fit`]), first to a part of the
 //!    episodes, then to all.
 //! 5. An effect is named if its ln evidence beats re-tuning's by a margin and held-out episodes agree. Where what is left stands out
-//!    ([`locate`]), or another one promises enough, the search goes on beside it; where it still does, and much of the gap is open, the verdict is `unknown`.
+//!    ([`locate`]), or another one promises enough, the search goes on beside it; where it still does, and much of the gap is open, the verdict is `unknown`. Of what is thrown
+//!    up to four are looked for in a part of the episodes, and fitted to all together.
 //! 6. [`report`]: where ([`locate`]), what, how sure ([`interval`]), before and after, what to record next ([`separate`]).
 //!
 //! The same log, seed and version give the same answer, whatever the number of threads.
