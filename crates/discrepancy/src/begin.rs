@@ -6,7 +6,7 @@ use physics_model::{EffectConfig, EffectKind};
 use crate::candidate::Candidate;
 use crate::fit::{Begin, Effort, Fit, cost, fit};
 use crate::model::Model;
-use crate::screen::Promise;
+use crate::screen::{Promise, shortlist};
 use crate::simulator::Hypothesis;
 use crate::study::Study;
 
@@ -15,6 +15,9 @@ const MOST: f64 = 0.5;
 
 /// A linear step that moves a tunable by more than this, in standard deviations of its prior, is tried with what it moves.
 const FAR: f64 = 1.0;
+
+/// A mass this many standard deviations from its prior's mean may stand for something else.
+const FAR_TUNED: f64 = 2.0;
 
 /// Fits anew from other strengths of the last effect, if one of them is better than where the fit is.
 pub(crate) fn shake(part: &Study, best: &mut Fit) {
@@ -93,6 +96,48 @@ pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
 fn weight_n(part: &Study, z: &[f64]) -> f64 {
     let nominal = part.simulator.nominal;
     nominal.object(z, 0.0, &part.engine).mass_kg * nominal.header().gravity_mps2
+}
+
+/// Where the friction does what re-tuning had to make the object heavier or lighter for: a slow push feels their product. `None` where the mass is about
+/// what it was taken for, or where the friction is re-tuned, too.
+fn friction_for_mass(part: &Study, base: &Fit, candidate: &Candidate) -> Option<Begin> {
+    let nominal = part.simulator.nominal;
+    let place = nominal.tunables.iter().position(|tunable| tunable.key == "object.mass_kg")?;
+    let z = base.x[place];
+    if candidate.kind() != EffectKind::FrictionLevel || nominal.tunes("table.friction") || z.abs() < FAR_TUNED {
+        return None;
+    }
+    let mass = |z| nominal.tunables[place].value(z);
+    let mut x = base.x.clone();
+    x[place] = 0.0;
+    let coefficient = nominal.header().table.friction.mean() * mass(z) / mass(0.0);
+    x.extend(candidate.coordinates_of(&[coefficient]));
+    let raw = part.raw(&base.model.with(candidate).hypothesis(&x));
+    Some(Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() })
+}
+
+/// What promises most alone, and where a fit of it begins where that is known: a friction that re-tuning replaced by a mass promises what it gains in
+/// its place.
+pub(crate) fn begun_alone(
+    part: &Study,
+    base: &Fit,
+    mut promises: Vec<Promise>,
+    count: usize,
+) -> Vec<(Promise, Option<Begin>)> {
+    let mut friction = None;
+    for promise in &mut promises {
+        let Some(begin) = friction_for_mass(part, base, &promise.candidate) else { continue };
+        let gained = base.cost() - begin.cost(part, &base.model.with(&promise.candidate));
+        let gain = gained * promise.episodes as f64 / part.chosen.len() as f64;
+        if gain > promise.gain {
+            promise.gain = gain;
+            friction = Some(begin);
+        }
+    }
+    promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let begin = |promise: &Promise| friction.clone().filter(|_| promise.candidate.kind() == EffectKind::FrictionLevel);
+    let list = shortlist(&promises, count).into_iter();
+    list.map(|promise| (promise.clone(), begin(&promise))).collect()
 }
 
 /// Coordinates that were simulated.

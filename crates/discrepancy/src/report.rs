@@ -31,7 +31,7 @@ pub struct NamedEffect {
     pub name: &'static str,
     /// What it does, in a line.
     pub description: &'static str,
-    /// Probability among the fitted rivals and the nominal model.
+    /// Probability among the fitted rivals and the nominal model, of tempered evidences ([`Settings::temperature`]).
     pub confidence: f64,
     /// Gain in ln evidence over the model without it; of one of several of what is thrown what the episodes of the screening say for all.
     pub log_evidence: f64,
@@ -106,7 +106,7 @@ pub struct Report {
     pub summary: String,
     /// Named effects, in the order in which they were accepted.
     pub effects: Vec<NamedEffect>,
-    /// Names that the data do not tell apart.
+    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first.
     pub confusion_set: Vec<&'static str>,
     /// Fitted rivals of the first round.
     pub ranking: Vec<RankedEffect>,
@@ -160,7 +160,7 @@ impl Report {
         let left = trimmed_mean(diagnosis.mean_squares.clone());
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
         widen(&mut samples, &diagnosis.model);
-        let effects = effects(diagnosis, &samples);
+        let effects = effects(diagnosis, &samples, settings.temperature);
         // A body in the way shows in the episodes that meet it, whatever the others lack.
         let heldout = diagnosis.heldout_episodes.iter().map(|(_, before, after)| [*before, *after]);
         let of_models = |group: &Range<usize>| {
@@ -244,7 +244,7 @@ fn typical_closing(episodes: impl Iterator<Item = [f64; 2]>, gap: f64) -> f64 {
     closings[closings.len() / 2]
 }
 
-fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
+fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], temperature: f64) -> Vec<NamedEffect> {
     let model = &diagnosis.model.model;
     let fitted = model.hypothesis(&diagnosis.model.x).effects;
     let resampled: Vec<_> = samples.iter().map(|x| model.hypothesis(x).effects).collect();
@@ -253,8 +253,7 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
             let kind = part.kind();
             let round = &diagnosis.rounds[place];
             let gain = round.rivals[0].gain;
-            let rest: f64 =
-                round.rivals.iter().skip(1).map(|rival| (rival.gain - gain).exp()).sum::<f64>() + (-gain).exp();
+            let others = round.rivals.iter().skip(1).map(|rival| rival.gain);
             let parameters = (part.coordinates.iter())
                 .map(|coordinate| {
                     let parameter = &kind.parameters()[coordinate.index];
@@ -271,12 +270,18 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
             NamedEffect {
                 name: kind.name(),
                 description: kind.description(),
-                confidence: 1.0 / (1.0 + rest),
+                confidence: confidence(gain, others, temperature),
                 log_evidence: gain,
                 parameters,
             }
         })
         .collect()
+}
+
+/// Probability of what gains so much among its rivals, of these gains, and nothing; equal prior odds, ln evidences divided by the temperature.
+fn confidence(gain: f64, others: impl Iterator<Item = f64>, temperature: f64) -> f64 {
+    let odds = |other: f64| ((other - gain) / temperature).exp();
+    1.0 / (1.0 + others.map(odds).sum::<f64>() + odds(0.0))
 }
 
 /// A key without the unit at its end.
@@ -290,7 +295,8 @@ fn bare(key: &str) -> &str {
 fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEffect]) -> Vec<&'static str> {
     let Some(first) = effects.first() else { return Vec::new() };
     let round = &diagnosis.rounds[0];
-    let near = round.rivals.iter().filter(|rival| first.log_evidence - rival.gain < settings.confusion);
+    let most = settings.temperature * settings.confusion.ln();
+    let near = round.rivals.iter().filter(|rival| first.log_evidence - rival.gain < most);
     near.map(|rival| EffectKind::name(rival.kind())).collect()
 }
 
@@ -380,6 +386,15 @@ mod tests {
         // Two episodes are no rule, and one odd one of four is none.
         assert_eq!(typical_closing(met.into_iter().take(5), 1.4), 1.0);
         assert!(typical_closing([[3.0, 1.0], [4.0, 1.1], [2.0, 0.9], [9.0, 9.5]].into_iter(), 1.4) > HALF);
+    }
+
+    #[test]
+    fn confidence_is_a_tempered_probability() {
+        // Alone with nothing, 10 ahead: odds of e² to 1; a rival beside it as good halves it.
+        let two = 2.0_f64.exp();
+        assert!((confidence(10.0, [].into_iter(), 5.0) - two / (two + 1.0)).abs() < 1e-12);
+        assert!((confidence(1e4, [1e4].into_iter(), 5.0) - 0.5).abs() < 1e-12);
+        assert!((confidence(1e4, [1e4 - 5.0 * 3.0_f64.ln()].into_iter(), 5.0) - 0.75).abs() < 1e-9);
     }
 
     #[test]
