@@ -108,6 +108,8 @@ pub struct Score {
     pub first: bool,
     /// Whether the truth is in the confusion set.
     pub confused: bool,
+    /// Number of names in the confusion set.
+    pub confusion: usize,
     /// Whether both of a pair were named.
     pub both: bool,
     /// Of each parameter of the hidden effect that was named first: key and whether its interval holds the true value.
@@ -147,6 +149,7 @@ impl Score {
             noise: truth.spec.noise,
             first,
             confused: answer.confusion_set.contains(&names[0]),
+            confusion: answer.confusion_set.len(),
             both: effect && names.iter().all(|name| named.contains(name)),
             covered,
             heldout: reference.map(|r| [answer.heldout.before, answer.heldout.after, r.truth, r.untuned]),

@@ -186,9 +186,13 @@ fn rows_to_markdown(text: &mut String, head: &str, rows: &[Row]) {
 }
 
 /// The figures of the issue that asked for this, in its order, and some that explain them.
-const FIGURES: [(&str, &str, &str, Figure); 16] = [
+const FIGURES: [(&str, &str, &str, Figure); 17] = [
     ("hidden effect named first", "≥ 92 %", "≥ 85 %", |s| share(s, in_catalogue, |s| s.first)),
     ("truth in the confusion set", "≥ 97 %", "≥ 95 %", |s| share(s, in_catalogue, |s| s.confused)),
+    ("names in a confusion set: mean", "", "", |s| {
+        let of = s.iter().filter(|s| in_catalogue(s) && s.confusion > 0);
+        mean(&of.map(|s| s.confusion as f64).collect::<Vec<f64>>())
+    }),
     ("wrong name with confidence ≥ 0.9", "≤ 3 %", "≤ 5 %", |s| share(s, in_catalogue, Score::wrong_and_sure)),
     ("false alarm with no effect", "≤ 3 %", "≤ 5 %", |s| {
         share(s, |s| s.group == Group::None, |s| s.verdict != "none")
@@ -279,6 +283,11 @@ fn share(scores: &[&Score], of: fn(&Score) -> bool, hit: impl Fn(&Score) -> bool
 fn count(hits: usize, of: usize) -> Option<Cell> {
     let (hits, of) = (hits as u32, of as u32);
     (of > 0).then(|| Cell::Share { hits, of, wilson95: wilson95(hits, of) })
+}
+
+fn mean(values: &[f64]) -> Option<Cell> {
+    let of = values.len();
+    (of > 0).then(|| Cell::Value { value: values.iter().sum::<f64>() / of as f64, of: of as u32 })
 }
 
 fn quantile(mut values: Vec<f64>, share: f64) -> Option<Cell> {

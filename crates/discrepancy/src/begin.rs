@@ -6,7 +6,7 @@ use physics_model::{EffectConfig, EffectKind};
 use crate::candidate::Candidate;
 use crate::fit::{Begin, Effort, Fit, cost, fit};
 use crate::model::Model;
-use crate::screen::{Promise, shortlist};
+use crate::screen::Promise;
 use crate::simulator::Hypothesis;
 use crate::study::Study;
 
@@ -100,44 +100,34 @@ fn weight_n(part: &Study, z: &[f64]) -> f64 {
 
 /// Where the friction does what re-tuning had to make the object heavier or lighter for: a slow push feels their product. `None` where the mass is about
 /// what it was taken for, or where the friction is re-tuned, too.
-fn friction_for_mass(part: &Study, base: &Fit, candidate: &Candidate) -> Option<Begin> {
+fn friction_for_mass(part: &Study, base: &Fit, candidate: &Candidate) -> Option<Vec<f64>> {
     let nominal = part.simulator.nominal;
     let place = nominal.tunables.iter().position(|tunable| tunable.key == "object.mass_kg")?;
     let z = base.x[place];
     if candidate.kind() != EffectKind::FrictionLevel || nominal.tunes("table.friction") || z.abs() < FAR_TUNED {
         return None;
     }
-    let mass = |z| nominal.tunables[place].value(z);
+    let mass_kg = |z| nominal.tunables[place].value(z);
+    // Known weights press on the table as well.
+    let added_kg = part.chosen.iter().map(|place| part.simulator.trials[*place].added_mass_kg).sum::<f64>()
+        / part.chosen.len().max(1) as f64;
+    let ratio = (mass_kg(z) + added_kg) / (mass_kg(0.0) + added_kg);
     let mut x = base.x.clone();
     x[place] = 0.0;
-    let coefficient = nominal.header().table.friction.mean() * mass(z) / mass(0.0);
-    x.extend(candidate.coordinates_of(&[coefficient]));
-    let raw = part.raw(&base.model.with(candidate).hypothesis(&x));
-    Some(Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() })
+    x.extend(candidate.coordinates_of(&[ratio * nominal.header().table.friction.mean()]));
+    Some(x)
 }
 
-/// What promises most alone, and where a fit of it begins where that is known: a friction that re-tuning replaced by a mass promises what it gains in
-/// its place.
-pub(crate) fn begun_alone(
-    part: &Study,
-    base: &Fit,
-    mut promises: Vec<Promise>,
-    count: usize,
-) -> Vec<(Promise, Option<Begin>)> {
-    let mut friction = None;
+/// A friction that re-tuning replaced by a mass promises what it gains in its place, if that is more than what a small step does.
+pub(crate) fn promise_friction(part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Promise> {
+    let mut promises = promises.to_vec();
     for promise in &mut promises {
-        let Some(begin) = friction_for_mass(part, base, &promise.candidate) else { continue };
-        let gained = base.cost() - begin.cost(part, &base.model.with(&promise.candidate));
-        let gain = gained * promise.episodes as f64 / part.chosen.len() as f64;
-        if gain > promise.gain {
-            promise.gain = gain;
-            friction = Some(begin);
-        }
+        let Some(x) = friction_for_mass(part, base, &promise.candidate) else { continue };
+        let gained = base.cost() - simulated(part, &base.model.with(&promise.candidate), x).cost;
+        promise.gain = promise.gain.max(gained * promise.episodes as f64 / part.chosen.len() as f64);
     }
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let begin = |promise: &Promise| friction.clone().filter(|_| promise.candidate.kind() == EffectKind::FrictionLevel);
-    let list = shortlist(&promises, count).into_iter();
-    list.map(|promise| (promise.clone(), begin(&promise))).collect()
+    promises
 }
 
 /// Coordinates that were simulated.
@@ -145,6 +135,11 @@ struct Place {
     cost: f64,
     x: Vec<f64>,
     raw: Vec<Vec<f64>>,
+}
+
+fn simulated(part: &Study, model: &Model, x: Vec<f64>) -> Place {
+    let raw = part.raw(&model.hypothesis(&x));
+    Place { cost: cost(&x, &part.white(&raw, model.engine_errors(&x))), x, raw }
 }
 
 /// The linear step of the screening as far as it helps: large effects are not linear.
@@ -155,10 +150,7 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     };
     let promised = promise.gain * part.chosen.len() as f64 / promise.episodes as f64;
     let before = base.cost();
-    let simulated = |x: Vec<f64>| -> Place {
-        let raw = part.raw(&model.hypothesis(&x));
-        Place { cost: cost(&x, &part.white(&raw, model.engine_errors(&x))), x, raw }
-    };
+    let simulated = |x: Vec<f64>| simulated(part, model, x);
     // Where re-tuning has gone far to do what an effect does, neither is right without the other.
     let together = |share: f64| -> Vec<f64> {
         let moved = base.x.iter().zip(&promise.beside).enumerate().map(|(index, (x, d))| {
@@ -192,6 +184,7 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
         let elsewhere = promise.candidate.elsewhere().into_iter();
         tried.extend(elsewhere.map(|own| simulated(base.x.iter().copied().chain(own).collect())));
     }
+    tried.extend(friction_for_mass(part, base, &promise.candidate).map(simulated));
     let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     let Place { x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
     Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() }

@@ -74,6 +74,12 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Rivals nearer than this in ln evidence are in the confusion set.
+    #[must_use]
+    pub fn near(&self) -> f64 {
+        self.temperature * self.confusion.ln()
+    }
+
     /// For a log of so many episodes.
     fn of_episodes(&self, episodes: usize) -> Self {
         let scaled = |count: usize| count.saturating_mul(episodes.max(EPISODES)) / EPISODES;

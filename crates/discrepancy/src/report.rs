@@ -295,8 +295,7 @@ fn bare(key: &str) -> &str {
 fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEffect]) -> Vec<&'static str> {
     let Some(first) = effects.first() else { return Vec::new() };
     let round = &diagnosis.rounds[0];
-    let most = settings.temperature * settings.confusion.ln();
-    let near = round.rivals.iter().filter(|rival| first.log_evidence - rival.gain < most);
+    let near = round.rivals.iter().filter(|rival| first.log_evidence - rival.gain < settings.near());
     near.map(|rival| EffectKind::name(rival.kind())).collect()
 }
 

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 use physics_model::{EffectConfig, EffectKind};
 
 use crate::accept::{Asked, Episodes, NEGLIGIBLE, better_heldout, both_convince, convinces, lasts, may_convince};
-use crate::begin::{begin, begun_alone, follow, shake};
+use crate::begin::{begin, follow, promise_friction, shake};
 use crate::candidate::Candidate;
 use crate::chain::Link;
 use crate::diagnosis::Settings;
@@ -464,7 +464,8 @@ impl Search<'_> {
     /// What promises most. Beside another effect, which may have gone some of the way, a linear step says less than what is simulated where a fit begins.
     fn begun(&self, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<(Promise, Option<Begin>)> {
         if base.model.parts.is_empty() {
-            return begun_alone(part, base, promises.to_vec(), self.settings.quick_fits);
+            let promises = promise_friction(part, base, promises);
+            return shortlist(&promises, self.settings.quick_fits).into_iter().map(|promise| (promise, None)).collect();
         }
         let mut list = Vec::new();
         for promise in shortlist(promises, self.settings.begins) {

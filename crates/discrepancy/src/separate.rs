@@ -56,6 +56,16 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "contact_compliance",
         "compare with the pose at contact: a slow force sensor does not move the object",
     ),
+    (
+        "time_base",
+        "friction_level",
+        "move freely along commands that change: only a wrong clock is early or late there",
+    ),
+    (
+        "mass_leak",
+        "force_drift",
+        "weigh the object before and after, or read the force without contact: only a drift shows there",
+    ),
     ("viscous_damping", "friction_level", "push at two speeds: friction does not grow with speed"),
 ];
 

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use discrepancy::{ModelFile, Nominal, Report, Settings, Verdict, diagnose, rig_tool};
-use measured_log::Log;
+use measured_log::{Log, Number};
 
 fn logs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs")
@@ -71,6 +71,17 @@ fn a_friction_that_was_taken_for_known_is_named_and_no_mass_stands_for_it() {
     let [low, high] = effect.parameters[0].interval90;
     assert!(low < 0.380_36 && 0.380_36 < high && high - low < 0.04, "{:?}", effect.parameters);
     assert!(found.heldout.before > 3.0 && found.heldout.after < 1.1, "{:?}", found.heldout);
+}
+
+#[test]
+fn a_mass_that_is_off_by_much_is_re_tuned_and_no_friction_stands_for_it() {
+    // The friction is right and known; the mass is twice what the header says, 4.6 standard deviations of its prior.
+    let mut log = measured_log::read(&logs().join("set-002")).unwrap();
+    log.header.table.friction = 0.380_36.into();
+    log.header.object.mass_kg = Number::Uncertain { mean: 0.25, stddev: 0.0375 };
+    let (found, _) = of(&log, "set-002", None);
+    assert_eq!(found.verdict, Verdict::None, "{}", found.summary);
+    assert!((found.retuned[0].value - 0.494_5).abs() < 0.01, "{:?}", found.retuned);
 }
 
 #[test]

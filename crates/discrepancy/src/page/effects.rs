@@ -5,6 +5,7 @@ use physics_model::effect::Neutral;
 
 use super::html::{decimals, escape, fixed, log_evidence, significant, words};
 use super::svg::{Axis, strip, strip_labels};
+use crate::diagnosis::Settings;
 use crate::report::{NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
 
 /// The named effects.
@@ -105,7 +106,11 @@ pub(super) fn ranking(report: &Report) -> String {
             "<div class=\"row rank axis\"><span></span><div>{}</div><span></span></div>",
             strip_labels(&axis, 4)
         );
-        out += "<p class=\"soft\">Gain in ln evidence over the re-tuned nominal model; behind: how much less than the best (3 is 20 to 1); held-out: mean square with it. A name needs both: the gain, and held-out episodes that agree.</p>";
+        let settings = Settings::default();
+        let [near, odds] = [settings.near(), settings.confusion];
+        out += &format!(
+            "<p class=\"soft\">Gain in ln evidence over the re-tuned nominal model; behind: how much less than the best ({near:.0} is {odds:.0} to 1, see confidence); held-out: mean square with it. A name needs both: the gain, and held-out episodes that agree.</p>"
+        );
     }
     if report.confusion_set.len() > 1 {
         let names: Vec<String> = report.confusion_set.iter().map(|name| words(name)).collect();

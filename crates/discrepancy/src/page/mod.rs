@@ -8,6 +8,7 @@ mod svg;
 #[cfg(test)]
 mod tests;
 
+use crate::diagnosis::Settings;
 use crate::report::{Report, Verdict};
 use html::{escape, fixed};
 
@@ -71,6 +72,14 @@ fn verdict(title: &str, report: &Report) -> String {
 }
 
 fn foot(report: &Report) -> String {
+    let settings = Settings::default();
+    let confidence = format!(
+        "Probability of the name among the fitted rivals and the nominal model, of ln evidences divided by {:.0}: what the engine gets wrong many readings \
+         share, and each is counted. {:.0} ahead is {:.0} to 1.",
+        settings.temperature,
+        settings.near(),
+        settings.confusion
+    );
     let lines = [
         (
             "residual",
@@ -81,11 +90,8 @@ fn foot(report: &Report) -> String {
             "held-out",
             "Episodes that nothing was fitted to; before: nominal model re-tuned; after: with the named effects.",
         ),
-        (
-            "ln evidence",
-            "How much more probable the log is under a model, its free values integrated over; + 3 is 20 to 1.",
-        ),
-        ("confidence", "Probability of the name among the fitted rivals and the nominal model."),
+        ("ln evidence", "How much more probable the log is under a model, its free values integrated over."),
+        ("confidence", confidence.as_str()),
         (
             "90 % interval",
             "By bootstrap over episodes, widened by what the engine's errors add: nine of ten hold the true value.",
