@@ -186,11 +186,16 @@ fn rows_to_markdown(text: &mut String, head: &str, rows: &[Row]) {
 }
 
 /// The figures of the issue that asked for this, in its order, and some that explain them.
-const FIGURES: [(&str, &str, &str, Figure); 17] = [
+const FIGURES: [(&str, &str, &str, Figure); 19] = [
     ("hidden effect named first", "≥ 92 %", "≥ 85 %", |s| share(s, in_catalogue, |s| s.first)),
     ("truth in the confusion set", "≥ 97 %", "≥ 95 %", |s| share(s, in_catalogue, |s| s.confused)),
+    ("the same, beside a name", "", "", |s| share(s, in_catalogue, |s| s.confused && !s.named.is_empty())),
     ("names in a confusion set: mean", "", "", |s| {
         let of = s.iter().filter(|s| in_catalogue(s) && s.confusion > 0);
+        mean(&of.map(|s| s.confusion as f64).collect::<Vec<f64>>())
+    }),
+    ("names that the evidence leans to where nothing is hidden: mean", "", "", |s| {
+        let of = s.iter().filter(|s| s.group == Group::None);
         mean(&of.map(|s| s.confusion as f64).collect::<Vec<f64>>())
     }),
     ("wrong name with confidence ≥ 0.9", "≤ 3 %", "≤ 5 %", |s| share(s, in_catalogue, Score::wrong_and_sure)),

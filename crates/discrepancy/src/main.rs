@@ -116,8 +116,11 @@ fn print_summary(report: &Report, out: &Path) {
             whole_file::out!("    {} = {:.4} {} (90 %: {low:.4} to {high:.4})", value.key, value.value, value.unit);
         }
     }
-    if report.confusion_set.len() > 1 {
-        whole_file::out!("  not told apart: {}", report.confusion_set.join(", "));
+    let names = report.confusion_set.join(", ");
+    if report.effects.is_empty() && !names.is_empty() {
+        whole_file::out!("  the evidence leans to, not enough for a name: {names}");
+    } else if report.confusion_set.len() > 1 {
+        whole_file::out!("  not told apart: {names}");
     }
     if let Some(description) = &report.description {
         whole_file::out!("  what is left: {description}");

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use physics_model::EffectKind;
 use serde::Serialize;
 
 use crate::diagnosis::{Diagnosis, Settings};
@@ -106,7 +105,8 @@ pub struct Report {
     pub summary: String,
     /// Named effects, in the order in which they were accepted.
     pub effects: Vec<NamedEffect>,
-    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first.
+    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first. Where nothing is named, what the evidence leans to, by too
+    /// little or without lasting: the best rival that gains anything, and those as near to it.
     pub confusion_set: Vec<&'static str>,
     /// Fitted rivals of the first round.
     pub ranking: Vec<RankedEffect>,
@@ -187,7 +187,7 @@ impl Report {
             version: 1,
             verdict,
             summary,
-            next_experiment: separate::next_experiment(verdict, &confusion_set),
+            next_experiment: separate::next_experiment(verdict, !effects.is_empty(), &confusion_set),
             confusion_set,
             ranking: ranking(diagnosis, count),
             located: diagnosis.located.clone(),
@@ -293,10 +293,16 @@ fn bare(key: &str) -> &str {
 }
 
 fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEffect]) -> Vec<&'static str> {
-    let Some(first) = effects.first() else { return Vec::new() };
-    let round = &diagnosis.rounds[0];
-    let near = round.rivals.iter().filter(|rival| first.log_evidence - rival.gain < settings.near());
-    near.map(|rival| EffectKind::name(rival.kind())).collect()
+    let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
+    let gains = round.rivals.iter().map(|rival| (rival.kind().name(), rival.gain));
+    near_the_first(gains, effects.first().map(|first| first.log_evidence), settings.near())
+}
+
+/// Of rivals, the most probable first, those nearer than this to what was named; where nothing was, to the first of those that gain anything.
+fn near_the_first<'a>(rivals: impl Iterator<Item = (&'a str, f64)>, named: Option<f64>, near: f64) -> Vec<&'a str> {
+    let mut rivals = rivals.filter(|(_, gain)| named.is_some() || *gain > 0.0).peekable();
+    let Some(best) = named.or_else(|| rivals.peek().map(|(_, gain)| *gain)) else { return Vec::new() };
+    rivals.filter(|(_, gain)| best - gain < near).map(|(name, _)| name).collect()
 }
 
 fn ranking(diagnosis: &Diagnosis, count: f64) -> Vec<RankedEffect> {
@@ -385,6 +391,16 @@ mod tests {
         // Two episodes are no rule, and one odd one of four is none.
         assert_eq!(typical_closing(met.into_iter().take(5), 1.4), 1.0);
         assert!(typical_closing([[3.0, 1.0], [4.0, 1.1], [2.0, 0.9], [9.0, 9.5]].into_iter(), 1.4) > HALF);
+    }
+
+    #[test]
+    fn what_is_near_the_name_is_not_told_apart_and_without_one_what_gains() {
+        let rivals = [("table_tilt", 40.0), ("constant_force", 30.0), ("adhesion", 9.0), ("tether", -2.0)];
+        assert_eq!(near_the_first(rivals.into_iter(), Some(40.0), 15.0), ["table_tilt", "constant_force"]);
+        assert_eq!(near_the_first(rivals.into_iter(), None, 15.0), ["table_tilt", "constant_force"]);
+        // A loss is nearer to nothing than to a name.
+        assert_eq!(near_the_first(rivals.into_iter().skip(2), None, 15.0), ["adhesion"]);
+        assert!(near_the_first(rivals.into_iter().skip(3), None, 15.0).is_empty());
     }
 
     #[test]

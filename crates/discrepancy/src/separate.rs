@@ -69,22 +69,42 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ("viscous_damping", "friction_level", "push at two speeds: friction does not grow with speed"),
 ];
 
-/// What to do next.
+/// What to do next; `named`: whether something was, or the confusion set is but what the evidence leans to.
 #[must_use]
-pub fn next_experiment(verdict: Verdict, confusion_set: &[&str]) -> String {
-    let first = confusion_set.first();
+pub fn next_experiment(verdict: Verdict, named: bool, confusion_set: &[&str]) -> String {
+    let first = confusion_set.first().filter(|_| named);
     for other in confusion_set.iter().skip(1) {
         let pair = PAIRS.iter().find(|(a, b, _)| first == Some(a) && other == b || first == Some(b) && other == a);
         if let Some((a, b, how)) = pair {
             return format!("{a} or {b}: {how}.");
         }
     }
+    const DESIGNED: &str = "a designed set (eight directions, four speeds, known added weights)";
     match (verdict, confusion_set) {
-        (Verdict::None, _) => "None needed; a designed set (eight directions, four speeds, known added weights) would show smaller effects.".into(),
+        (Verdict::None, []) => format!("None needed; {DESIGNED} would show smaller effects."),
+        (Verdict::None, names) => {
+            format!("None needed; {DESIGNED} would show whether there is a weak {}.", names.join(" or "))
+        }
         (Verdict::Unknown, _) => {
-            "Repeat the worst episodes with one thing changed at a time: place, direction, speed, added weight, time.".into()
+            "Repeat the worst episodes with one thing changed at a time: place, direction, speed, added weight, time."
+                .into()
         }
         (Verdict::Effect, [_]) => "None needed to name it; more episodes narrow the intervals.".into(),
-        (Verdict::Effect, names) => format!("{}: a designed set with eight directions, four speeds and known added weights.", names.join(" or ")),
+        (Verdict::Effect, names) => format!("{}: {DESIGNED}.", names.join(" or ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pair_is_told_apart_only_if_one_of_it_is_named() {
+        let pair = ["mass_leak", "force_drift"];
+        assert!(next_experiment(Verdict::Effect, true, &pair).starts_with("mass_leak or force_drift: weigh"));
+        assert!(next_experiment(Verdict::Unknown, true, &pair).contains("weigh"));
+        assert!(next_experiment(Verdict::Unknown, false, &pair).starts_with("Repeat"));
+        assert!(next_experiment(Verdict::None, false, &pair).ends_with("a weak mass_leak or force_drift."));
+        assert!(next_experiment(Verdict::None, false, &[]).ends_with("smaller effects."));
     }
 }

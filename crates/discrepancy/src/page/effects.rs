@@ -112,12 +112,14 @@ pub(super) fn ranking(report: &Report) -> String {
             "<p class=\"soft\">Gain in ln evidence over the re-tuned nominal model; behind: how much less than the best ({near:.0} is {odds:.0} to 1, see confidence); held-out: mean square with it. A name needs both: the gain, and held-out episodes that agree.</p>"
         );
     }
-    if report.confusion_set.len() > 1 {
-        let names: Vec<String> = report.confusion_set.iter().map(|name| words(name)).collect();
-        out += &format!("<p><b>Not told apart by this log:</b> {}.</p>", names.join(", "));
-    } else if !report.effects.is_empty() {
-        out += "<p><b>Confusion set:</b> no other effect explains this log as well.</p>";
-    }
+    let names: Vec<String> = report.confusion_set.iter().map(|name| words(name)).collect();
+    let names = names.join(", ");
+    out += &match (report.effects.is_empty(), report.confusion_set.len()) {
+        (true, 0) => String::new(),
+        (true, _) => format!("<p><b>What the evidence leans to, not enough for a name:</b> {names}.</p>"),
+        (false, 0 | 1) => "<p><b>Confusion set:</b> no other effect explains this log as well.</p>".into(),
+        (false, _) => format!("<p><b>Not told apart by this log:</b> {names}.</p>"),
+    };
     out + &format!("<p><b>Next experiment:</b> {}</p>", escape(&report.next_experiment))
 }
 
