@@ -68,7 +68,7 @@ pub(crate) fn both_convince([first, second]: [&Round; 2], episodes: &Episodes, a
 
 /// Whether what was held out is explained better than by another model, of which these are the sums of squares.
 pub(crate) fn better_heldout(found: &[f64], other: &[f64], episodes: &Episodes) -> bool {
-    gains(other, found, &episodes.counts).iter().sum::<f64>() > 0.0
+    heldout_gains(other, found, &episodes.counts).iter().sum::<f64>() > 0.0
 }
 
 /// Whether each effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
@@ -91,7 +91,7 @@ pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
 }
 
 /// What each held-out piece gains in ln p from one model to another, by their sums of squares.
-fn gains(before: &[f64], after: &[f64], counts: &[usize]) -> Vec<f64> {
+pub(crate) fn heldout_gains(before: &[f64], after: &[f64], counts: &[usize]) -> Vec<f64> {
     (before.iter().zip(after).zip(counts))
         .map(|((before, after), count)| episode_cost(*before, *count) - episode_cost(*after, *count))
         .collect()
@@ -100,7 +100,7 @@ fn gains(before: &[f64], after: &[f64], counts: &[usize]) -> Vec<f64> {
 /// Whether what was held out is explained no worse, and the effect shows in more than one episode, whether fitted or held out: an odd one names
 /// nothing.
 fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bool {
-    let heldout = gains(&round.before, &rival.heldout, &episodes.counts);
+    let heldout = heldout_gains(&round.before, &rival.heldout, &episodes.counts);
     let cost = |residuals: &DVector<f64>| episode_cost(residuals.norm_squared(), residuals.len());
     let fitted: Vec<f64> = round
         .base
@@ -152,7 +152,14 @@ mod tests {
             fit: leaves(found),
             whole: true,
         };
-        Round { promises: Vec::new(), rivals: vec![rival], base: leaves(base), before: heldout(base), hasty: true }
+        Round {
+            promises: Vec::new(),
+            rivals: vec![rival],
+            passed_over: Vec::new(),
+            base: leaves(base),
+            before: heldout(base),
+            hasty: true,
+        }
     }
 
     #[test]

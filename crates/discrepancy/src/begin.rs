@@ -180,9 +180,17 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     if base.model.parts.is_empty() && promise.beside.iter().take(model.tunables).any(|d| d.abs() > FAR) {
         tried.extend([whole, 0.4 * whole].map(|share| simulated(together(share))));
     }
-    if !tried.iter().any(good) {
-        let elsewhere = promise.candidate.elsewhere().into_iter();
-        tried.extend(elsewhere.map(|own| simulated(base.x.iter().copied().chain(own).collect())));
+    let clips = promise.candidate.kind() == EffectKind::ForceSaturation;
+    if clips || !tried.iter().any(good) {
+        for own in promise.candidate.elsewhere() {
+            tried.push(simulated(base.x.iter().chain(&own).copied().collect()));
+            // What re-tuning moved far to do what a sensor does is back where it was without it.
+            if clips && base.x.iter().take(model.tunables).any(|z| z.abs() > FAR_TUNED) {
+                let others = base.x.iter().skip(model.tunables);
+                let back = std::iter::repeat_n(&0.0, model.tunables).chain(others);
+                tried.push(simulated(back.chain(&own).copied().collect()));
+            }
+        }
     }
     tried.extend(friction_for_mass(part, base, &promise.candidate).map(simulated));
     let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));

@@ -20,6 +20,8 @@ const FAR: f64 = 1.2;
 const SOFT: f64 = 0.5;
 /// Anisotropies that are tried along every axis.
 const AMPLITUDES: [f64; 2] = [0.04, 0.1];
+/// Limits of a force sensor, as shares of the largest force that was read, from one that acts along an axis to one along a space diagonal.
+const CLIPS: [f64; 4] = [1.0, 0.85, 0.7, 0.58];
 /// Coefficients of restitution that are tried.
 const BOUNCES: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
 /// Places of a patch that are tried.
@@ -145,6 +147,9 @@ impl Candidate {
                 let axes = |a| (0..8).map(move |eighth| [a, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
                 AMPLITUDES.into_iter().flat_map(axes).map(|values| self.coordinates_of(&values)).collect()
             }
+            // One that clips most of what is read leaves no slope that says so. In their unit, which is that of a limit of three tenths of the largest force, limits are
+            // where they are whatever that is.
+            EffectKind::ForceSaturation => CLIPS.iter().map(|share| vec![0.3 / (STRENGTH_SHARE * share)]).collect(),
             _ => Vec::new(),
         }
     }

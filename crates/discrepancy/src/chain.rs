@@ -107,8 +107,14 @@ impl Search<'_> {
         self.learn_errors(found.last().filter(|longest| longest.model.parts.len() >= LEAST)?);
         let base = fit(&self.study, null.model.clone(), Begin::at(&null.x), Effort::Quick);
         let before = self.heldout(&base);
-        let beside =
-            |promises, rivals| Round { promises, rivals, base: base.clone(), before: before.clone(), hasty: true };
+        let beside = |promises, rivals| Round {
+            promises,
+            rivals,
+            passed_over: Vec::new(),
+            base: base.clone(),
+            before: before.clone(),
+            hasty: true,
+        };
         let round = |link: &Link| beside(link.promises.clone(), self.rivals(screening, link));
         let without = beside(Vec::new(), Vec::new());
         for (place, begin) in found.into_iter().enumerate().rev() {

@@ -15,11 +15,13 @@ use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Nominal, Tunable};
+use crate::report::{Verdict, verdict};
 use crate::rival::Round;
 use crate::screen::{Screening, places};
 use crate::search::Search;
 use crate::simulator::Simulator;
 use crate::study::Study;
+use crate::terms::{LackingForce, lacking_force};
 use crate::trial::{Trial, groups};
 
 /// A log of so many episodes may take the whole budget.
@@ -141,8 +143,8 @@ pub struct Diagnosis {
     pub rounds: Vec<Round>,
     /// Sums of squares of the held-out episodes: nominal and accepted model, with the errors of the accepted one.
     pub heldout: [Vec<f64>; 2],
-    /// Number of held-out residuals.
-    pub heldout_count: usize,
+    /// Number of residuals of each held-out piece.
+    pub heldout_counts: Vec<usize>,
     /// Of each held-out episode: number in the log, mean squares of nominal and accepted model.
     pub heldout_episodes: Vec<(u64, f64, f64)>,
     /// Mean squares of all episodes under the accepted model.
@@ -153,6 +155,8 @@ pub struct Diagnosis {
     pub located: Vec<Cell>,
     /// Where the accepted model still does.
     pub remaining: Vec<Cell>,
+    /// What force on the object the re-tuned nominal model lacks, where the verdict is that nothing in the catalogue explains it.
+    pub lacking_force: Option<LackingForce>,
     /// Held-out episodes before and after, for plots.
     pub evidence: Evidence,
     /// Simulated episodes.
@@ -216,7 +220,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         None if accepted.model.parts.is_empty() => located.clone(),
         None => locate(&simulator, chosen, &accepted, settings.seed),
     };
-    Ok(Diagnosis {
+    let mut diagnosis = Diagnosis {
         located,
         remaining,
         evidence: Evidence::new(&search.kept, &null, &accepted),
@@ -224,13 +228,19 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         model: accepted,
         rounds,
         heldout,
-        heldout_count: search.kept.count(),
+        heldout_counts: episodes.counts,
         heldout_episodes,
         mean_squares,
         tunables: nominal.tunables.clone(),
-        rollouts: simulator.rollouts(),
+        lacking_force: None,
+        rollouts: 0,
         pieces: episodes.fitted,
-    })
+    };
+    if verdict(&diagnosis, settings) == Verdict::Unknown {
+        diagnosis.lacking_force = lacking_force(&simulator, chosen, &diagnosis.nominal);
+    }
+    diagnosis.rollouts = simulator.rollouts();
+    Ok(diagnosis)
 }
 
 /// What the log is compared by, and which of it is fitted and held out.

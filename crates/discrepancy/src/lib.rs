@@ -58,6 +58,7 @@ mod search;
 pub mod separate;
 pub mod simulator;
 pub mod study;
+pub mod terms;
 pub mod trial;
 pub mod whitener;
 

@@ -9,7 +9,9 @@ use crate::evidence::Evidence;
 use crate::interval::{bootstrap, middle_90, widen};
 use crate::likelihood::{NOISE_FLOOR, mean_square, trimmed_mean};
 use crate::locate::Cell;
+use crate::rival::Rival;
 use crate::separate;
+use crate::terms::LackingForce;
 
 /// The verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -105,17 +107,19 @@ pub struct Report {
     pub summary: String,
     /// Named effects, in the order in which they were accepted.
     pub effects: Vec<NamedEffect>,
-    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first. Where nothing is named, what the evidence leans to, by too
+    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first, or more likely by all episodes, but held-out ones spoke against them. Where nothing is named, what the evidence leans to, by too
     /// little or without lasting: the best rival that gains anything, and those as near to it.
     pub confusion_set: Vec<&'static str>,
-    /// Fitted rivals of the first round.
+    /// Fitted rivals of the first round, those among them that gain more than what was named but explain held-out episodes worse.
     pub ranking: Vec<RankedEffect>,
     /// Where the re-tuned nominal model disagrees.
     pub located: Vec<Cell>,
     /// Where the accepted model still does.
     pub remaining: Vec<Cell>,
-    /// For a gap that the catalogue does not explain: where it acts.
+    /// For a gap that the catalogue does not explain: where it acts, and what the force on the object that is lacking follows.
     pub description: Option<String>,
+    /// The latter in numbers; `None` where no gap is left, or too little moves to say.
+    pub lacking_force: Option<LackingForce>,
     /// Held-out comparison.
     pub heldout: Heldout,
     /// The nominal model, re-tuned.
@@ -152,37 +156,16 @@ impl Report {
     /// What a diagnosis says.
     #[must_use]
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
-        let count = diagnosis.heldout_count.max(1) as f64;
-        let mean = |sums: &[f64]| sums.iter().sum::<f64>() / count;
-        let (before, after) = (mean(&diagnosis.heldout[0]), mean(&diagnosis.heldout[1]));
-        let gap = before - NOISE_FLOOR;
-        let closed_fraction = if gap > 0.0 { ((before - after) / gap).min(1.0) } else { 1.0 };
-        let left = trimmed_mean(diagnosis.mean_squares.clone());
+        let count = diagnosis.heldout_counts.iter().sum::<usize>().max(1) as f64;
+        let [before, after] = heldout_errors(diagnosis);
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
         widen(&mut samples, &diagnosis.model);
-        let effects = effects(diagnosis, &samples, settings.temperature);
-        // A body in the way shows in the episodes that meet it, whatever the others lack.
-        let heldout = diagnosis.heldout_episodes.iter().map(|(_, before, after)| [*before, *after]);
-        let of_models = |group: &Range<usize>| {
-            [&diagnosis.nominal, &diagnosis.model].map(|fit| mean_square(&fit.residuals[group.clone()]))
-        };
-        let fitted = diagnosis.pieces.iter().map(of_models);
-        let everywhere = diagnosis.model.model.parts.iter().any(|part| part.begin.is_none());
-        // Of what was fitted, where the gap is plain: a cause that few episodes meet need not show in those held out.
-        let chance = diagnosis.remaining.iter().map(|cell| cell.p_value).fold(1.0, f64::min);
-        let few = diagnosis.pieces.len() < LEAST_TO_STAND_OUT;
-        let shows = chance < settings.another || (few && closed_fraction < NEARLY_CLOSED);
-        let beside_it = everywhere && shows && stands_for_another(before, heldout, fitted, settings);
-        let odd = effects.is_empty() && diagnosis.heldout_episodes.iter().any(|(_, _, after)| *after > settings.odd);
-        let unexplained = beside_it || odd || is_left(left, chance, closed_fraction, settings);
-        let verdict = match (unexplained, effects.is_empty()) {
-            (true, _) => Verdict::Unknown,
-            (false, true) => Verdict::None,
-            (false, false) => Verdict::Effect,
-        };
+        let effects = effects(diagnosis, &samples, settings);
+        let verdict = verdict(diagnosis, settings);
         let confusion_set = confusion_set(diagnosis, settings, &effects);
         let summary = summary(verdict, &effects, before, after);
-        let description = (verdict == Verdict::Unknown).then(|| describe(&diagnosis.remaining));
+        let description =
+            (verdict == Verdict::Unknown).then(|| describe(&diagnosis.remaining, diagnosis.lacking_force.as_ref()));
         Self {
             version: 1,
             verdict,
@@ -193,11 +176,12 @@ impl Report {
             located: diagnosis.located.clone(),
             remaining: diagnosis.remaining.clone(),
             description,
+            lacking_force: diagnosis.lacking_force.clone(),
             heldout: Heldout {
                 before,
                 after,
                 noise_floor: NOISE_FLOOR,
-                closed_fraction,
+                closed_fraction: closed_fraction(before, after),
                 unit: "chi2 per sample",
                 episodes: diagnosis.heldout_episodes.clone(),
             },
@@ -209,6 +193,43 @@ impl Report {
             rollouts: diagnosis.rollouts,
             seconds,
         }
+    }
+}
+
+/// Held-out mean squares under the re-tuned nominal and the accepted model.
+fn heldout_errors(diagnosis: &Diagnosis) -> [f64; 2] {
+    let count = diagnosis.heldout_counts.iter().sum::<usize>().max(1) as f64;
+    diagnosis.heldout.each_ref().map(|sums| sums.iter().sum::<f64>() / count)
+}
+
+fn closed_fraction(before: f64, after: f64) -> f64 {
+    let gap = before - NOISE_FLOOR;
+    if gap > 0.0 { ((before - after) / gap).min(1.0) } else { 1.0 }
+}
+
+/// The verdict.
+pub(crate) fn verdict(diagnosis: &Diagnosis, settings: &Settings) -> Verdict {
+    let [before, after] = heldout_errors(diagnosis);
+    let closed_fraction = closed_fraction(before, after);
+    let parts = &diagnosis.model.model.parts;
+    let left = trimmed_mean(diagnosis.mean_squares.clone());
+    let heldout = diagnosis.heldout_episodes.iter().map(|(_, before, after)| [*before, *after]);
+    let of_models = |group: &Range<usize>| {
+        [&diagnosis.nominal, &diagnosis.model].map(|fit| mean_square(&fit.residuals[group.clone()]))
+    };
+    let fitted = diagnosis.pieces.iter().map(of_models);
+    // A body in the way shows in the episodes that meet it, whatever the others lack.
+    let everywhere = parts.iter().any(|part| part.begin.is_none());
+    // Of what was fitted, where the gap is plain: a cause that few episodes meet need not show in those held out.
+    let chance = diagnosis.remaining.iter().map(|cell| cell.p_value).fold(1.0, f64::min);
+    let few = diagnosis.pieces.len() < LEAST_TO_STAND_OUT;
+    let shows = chance < settings.another || (few && closed_fraction < NEARLY_CLOSED);
+    let beside_it = everywhere && shows && stands_for_another(before, heldout, fitted, settings);
+    let odd = parts.is_empty() && diagnosis.heldout_episodes.iter().any(|(_, _, after)| *after > settings.odd);
+    match (beside_it || odd || is_left(left, chance, closed_fraction, settings), parts.is_empty()) {
+        (true, _) => Verdict::Unknown,
+        (false, true) => Verdict::None,
+        (false, false) => Verdict::Effect,
     }
 }
 
@@ -244,7 +265,7 @@ fn typical_closing(episodes: impl Iterator<Item = [f64; 2]>, gap: f64) -> f64 {
     closings[closings.len() / 2]
 }
 
-fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], temperature: f64) -> Vec<NamedEffect> {
+fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> Vec<NamedEffect> {
     let model = &diagnosis.model.model;
     let fitted = model.hypothesis(&diagnosis.model.x).effects;
     let resampled: Vec<_> = samples.iter().map(|x| model.hypothesis(x).effects).collect();
@@ -253,7 +274,9 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], temperature: f64) -> Vec
             let kind = part.kind();
             let round = &diagnosis.rounds[place];
             let gain = round.rivals[0].gain;
-            let others = round.rivals.iter().skip(1).map(|rival| rival.gain);
+            let passed = round.passed_over(&diagnosis.heldout_counts);
+            let passed = passed.iter().map(|(_, more)| gain + more);
+            let others = round.rivals.iter().skip(1).map(|rival| rival.gain).chain(passed);
             let parameters = (part.coordinates.iter())
                 .map(|coordinate| {
                     let parameter = &kind.parameters()[coordinate.index];
@@ -270,7 +293,7 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], temperature: f64) -> Vec
             NamedEffect {
                 name: kind.name(),
                 description: kind.description(),
-                confidence: confidence(gain, others, temperature),
+                confidence: confidence(gain, others, settings.temperature),
                 log_evidence: gain,
                 parameters,
             }
@@ -294,8 +317,11 @@ fn bare(key: &str) -> &str {
 
 fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEffect]) -> Vec<&'static str> {
     let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
-    let gains = round.rivals.iter().map(|rival| (rival.kind().name(), rival.gain));
-    near_the_first(gains, effects.first().map(|first| first.log_evidence), settings.near())
+    let named = effects.first().map(|first| first.log_evidence);
+    let passed = round.passed_over(&diagnosis.heldout_counts);
+    let passed = passed.iter().map(|(kind, more)| (kind.name(), named.unwrap_or(0.0) + more));
+    let gains = round.rivals.iter().map(|rival| (rival.kind().name(), rival.gain)).chain(passed);
+    near_the_first(gains, named, settings.near())
 }
 
 /// Of rivals, the most probable first, those nearer than this to what was named; where nothing was, to the first of those that gain anything.
@@ -306,9 +332,10 @@ fn near_the_first<'a>(rivals: impl Iterator<Item = (&'a str, f64)>, named: Optio
 }
 
 fn ranking(diagnosis: &Diagnosis, count: f64) -> Vec<RankedEffect> {
-    let rivals = diagnosis.rounds.first().map(|round| round.rivals.as_slice()).unwrap_or_default();
-    rivals
-        .iter()
+    let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
+    let mut rivals: Vec<&Rival> = round.rivals.iter().chain(round.passed_over_kinds()).collect();
+    rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    (rivals.into_iter())
         .map(|rival| RankedEffect {
             name: rival.kind().name(),
             log_evidence: rival.gain,
@@ -361,7 +388,7 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
 /// Cells that a description of what is left names.
 const LARGEST: usize = 3;
 
-fn describe(remaining: &[Cell]) -> String {
+fn describe(remaining: &[Cell], lacking: Option<&LackingForce>) -> String {
     // The largest shares, and what stands out most: it may have decided.
     let surest = remaining.iter().enumerate().skip(LARGEST).min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value));
     let surer = |p_value: f64| remaining.iter().take(LARGEST).all(|cell| p_value < cell.p_value);
@@ -376,7 +403,8 @@ fn describe(remaining: &[Cell]) -> String {
             )
         })
         .collect();
-    worst.join("; ")
+    let follows = lacking.map(|lacking| format!("; {}", lacking.sentence())).unwrap_or_default();
+    worst.join("; ") + &follows
 }
 
 #[cfg(test)]

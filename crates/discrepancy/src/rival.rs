@@ -2,6 +2,7 @@
 
 use physics_model::EffectKind;
 
+use crate::accept::heldout_gains;
 use crate::fit::Fit;
 use crate::screen::Promise;
 
@@ -37,6 +38,8 @@ pub struct Round {
     pub promises: Vec<Promise>,
     /// The fitted ones, the most probable first.
     pub rivals: Vec<Rival>,
+    /// Those with more evidence than the first one that did not convince, as far as they were dropped for it.
+    pub passed_over: Vec<Rival>,
     /// The model that they were added to, with the same errors; of several effects that were fitted together the nominal one.
     pub base: Fit,
     /// Sums of squares of the held-out episodes under that model.
@@ -46,6 +49,24 @@ pub struct Round {
 }
 
 impl Round {
+    /// Drops the rivals before the one at `place`, which convinces.
+    pub(crate) fn pass_over(&mut self, place: usize) {
+        self.passed_over.extend(self.rivals.drain(..place));
+    }
+
+    /// Those that were passed over, as far as no rival has their effect.
+    pub(crate) fn passed_over_kinds(&self) -> impl Iterator<Item = &Rival> {
+        self.passed_over.iter().filter(|rival| self.rivals.iter().all(|found| found.kind() != rival.kind()))
+    }
+
+    /// Of these the kind, and by how much more they explain all episodes than the first rival does, those held out (of which each piece has so many residuals) among them:
+    /// ln evidence of what was fitted, ln p of what was not.
+    pub(crate) fn passed_over(&self, counts: &[usize]) -> Vec<(EffectKind, f64)> {
+        let Some(first) = self.rivals.first() else { return Vec::new() };
+        let all = |rival: &Rival| rival.gain + heldout_gains(&self.before, &rival.heldout, counts).iter().sum::<f64>();
+        self.passed_over_kinds().map(|rival| (rival.kind(), all(rival) - all(first))).collect()
+    }
+
     /// The fit of the first rival, or that of the model without one.
     pub(crate) fn best(&self, found: bool) -> &Fit {
         self.rivals.first().filter(|_| found).map_or(&self.base, |rival| &rival.fit)
@@ -84,6 +105,34 @@ pub(crate) fn of_first<T, K: PartialEq>(list: &mut Vec<T>, count: usize, key: im
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::candidate::{candidates, tests::context};
+    use crate::model::Model;
+
+    /// A rival that gains so much and leaves such a sum of squares of 100 held-out residuals.
+    fn rival(kind: EffectKind, gain: f64, left: f64) -> Rival {
+        let candidate = candidates(&context()).into_iter().find(|candidate| candidate.kind() == kind).unwrap();
+        let model = Model::nominal(0, 0).with(&candidate);
+        let fit = Fit { model, x: Vec::new(), raw: Vec::new(), residuals: Vec::new(), jacobian: Vec::new() };
+        Rival { fit, whole: true, gain, heldout: vec![left] }
+    }
+
+    #[test]
+    fn what_held_out_episodes_speak_against_is_weighed_by_all_of_them() {
+        use EffectKind as K;
+        let rivals = vec![rival(K::TimeBase, 80.0, 104.0), rival(K::FrictionLevel, 40.0, 98.0)];
+        let base = rival(K::Tether, 0.0, 100.0).fit;
+        let mut round =
+            Round { promises: Vec::new(), rivals, passed_over: Vec::new(), base, before: vec![100.0], hasty: false };
+        assert!(round.passed_over(&[100]).is_empty());
+        round.pass_over(1);
+        let [(kind, more)] = round.passed_over(&[100])[..] else { panic!("one was passed over") };
+        // 40 of what was fitted, less what the held-out ones say.
+        assert_eq!(kind, K::TimeBase);
+        assert!((30.0..40.0).contains(&more), "{more}");
+        // Once it is a rival again it is no other.
+        round.rivals.push(rival(K::TimeBase, 10.0, 100.0));
+        assert!(round.passed_over(&[100]).is_empty());
+    }
 
     #[test]
     fn variants_of_a_kind_count_once() {

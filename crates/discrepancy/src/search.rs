@@ -117,7 +117,7 @@ impl Search<'_> {
     fn choose(&self, round: &mut Round, episodes: &Episodes, explained: f64) -> bool {
         let asked = self.asked(explained);
         let best = round.rivals.iter().position(|rival| convinces(rival, round, episodes, asked, self.settings.seed));
-        round.rivals.drain(..best.unwrap_or(0));
+        round.pass_over(best.unwrap_or(0));
         best.is_some()
     }
 
@@ -141,7 +141,7 @@ impl Search<'_> {
         if !self.choose(&mut second, episodes, gain) || !both_convince([round, &second], episodes, asked) {
             return None;
         }
-        round.rivals.drain(..first);
+        round.pass_over(first);
         self.exchange(screening, [round, &mut second], episodes);
         Some(second)
     }
@@ -336,7 +336,7 @@ impl Search<'_> {
             self.compare_nearest(&mut rivals, share, &fully);
         }
         first_of_each(&mut rivals, Rival::kind);
-        let mut round = Round { promises, rivals, before: self.heldout(&base), base, hasty };
+        let mut round = Round { promises, rivals, passed_over: Vec::new(), before: self.heldout(&base), base, hasty };
         self.tune(&mut round);
         round
     }

@@ -11,6 +11,7 @@ mod phase;
 mod series;
 mod shots;
 mod start;
+mod windows;
 
 use std::ops::Range;
 
@@ -24,6 +25,7 @@ use crate::noise::NoiseLevels;
 pub use kind::Kind;
 pub use phase::Phase;
 pub use series::Compared;
+pub(crate) use windows::Window;
 
 /// Blocks of a channel in an episode, about.
 const BLOCKS: usize = 80;

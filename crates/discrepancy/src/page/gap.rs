@@ -4,6 +4,7 @@ use super::html::{escape, fixed, mean_square, significant, words};
 use super::svg::{Axis, Plot, strip, strip_labels};
 use crate::evidence::{ChannelError, Course, Evidence, Path, REACH, Residuals};
 use crate::report::{Report, Verdict};
+use crate::terms::{Coefficient, FoundTerm, LackingForce};
 
 const KEY: &str = "<p class=\"key\"><i class=\"km\"></i>measured<i class=\"kb\"></i>before: re-tuned nominal<i class=\"ka\"></i>after: with the named effects</p>";
 const KEY_NONE: &str = "<p class=\"key\"><i class=\"km\"></i>measured<i class=\"kb\"></i>re-tuned nominal (before and after are the same)</p>";
@@ -207,7 +208,8 @@ pub(super) fn remains(report: &Report) -> String {
     let description = report.description.as_deref().map(escape).unwrap_or_default();
     match report.verdict {
         Verdict::Unknown => {
-            format!("<div class=\"call\"><p><b>Unexplained.</b> {description}</p></div>")
+            let lacking = report.lacking_force.as_ref().map(lacking_force).unwrap_or_default();
+            format!("<div class=\"call\"><p><b>Unexplained.</b> {description}</p></div>{lacking}")
         }
         Verdict::Effect => {
             "<p>Where the model with the named effects still disagrees, on the episodes that it was fitted to:</p>"
@@ -215,4 +217,32 @@ pub(super) fn remains(report: &Report) -> String {
         }
         Verdict::None => "<p>Nothing that shows: the map above is what the re-tuned nominal model leaves.</p>".into(),
     }
+}
+
+/// What the force that is lacking follows.
+fn lacking_force(lacking: &LackingForce) -> String {
+    let value = |c: &Coefficient| format!("{} {} {}", words(c.key), significant(c.value, 3), c.unit);
+    let row = |term: &FoundTerm| {
+        let values: Vec<String> = term.coefficients.iter().map(value).collect();
+        format!(
+            "<tr><td>{}</td><td>{} %</td><td>{}</td></tr>",
+            escape(&term.description),
+            fixed(100.0 * term.share, 0),
+            values.join(", ")
+        )
+    };
+    let table = if lacking.terms.is_empty() {
+        "<p>It follows no term that was tried: constant, direction and speed of the motion, place, time, known weight, force.</p>".into()
+    } else {
+        let rows: String = lacking.terms.iter().map(row).collect();
+        format!("<table><tr><th>term</th><th>explains</th><th>values</th></tr>{rows}</table>")
+    };
+    format!(
+        "<h3>The force that is lacking</h3>{table}<p class=\"soft\">{} N on the object beyond the re-tuned nominal model (root mean square of {} windows in which it moves, of {} episodes; \
+         the sensors' noise makes {} N). Explains: share of its square in episodes that were left out. Base axes.</p>",
+        significant(lacking.root_mean_square_n, 2),
+        lacking.windows,
+        lacking.episodes,
+        significant(lacking.noise_n, 2)
+    )
 }

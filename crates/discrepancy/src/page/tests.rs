@@ -2,6 +2,7 @@ use super::page;
 use crate::evidence::{BINS, ChannelError, Course, Evidence, LAGS, Path, Residuals};
 use crate::locate::Cell;
 use crate::report::{Heldout, NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
+use crate::terms::{Coefficient, FoundTerm, LackingForce};
 use crate::trial::{Kind, Phase};
 
 fn cell(channel: Kind, phase: Phase, mean_square: f64, p_value: f64) -> Cell {
@@ -71,6 +72,19 @@ fn report(verdict: Verdict) -> Report {
         located: cells.clone(),
         remaining: cells,
         description: (verdict == Verdict::Unknown).then(|| "wrist_force during sliding".into()),
+        lacking_force: (verdict == Verdict::Unknown).then(|| LackingForce {
+            windows: 338,
+            episodes: 20,
+            root_mean_square_n: 0.374,
+            noise_n: 0.041,
+            explained_share: 0.87,
+            terms: vec![FoundTerm {
+                name: "near_place",
+                description: "towards or from (-0.019, 0.075) m, falling with the distance".into(),
+                share: 0.87,
+                coefficients: vec![Coefficient { key: "strength", unit: "N m²", value: 0.000_853 }],
+            }],
+        }),
         heldout: Heldout {
             before: 9.1,
             after: if named { 1.04 } else { 9.1 },
@@ -218,6 +232,17 @@ fn an_unknown_gap_is_described_at_the_top() {
     let html = page("set-003", &report(Verdict::Unknown));
     let first = html.find("wrist_force during sliding").expect("a description");
     assert!(first < html.find("<section").expect("a section"));
+}
+
+#[test]
+fn what_the_lacking_force_follows_is_told_with_its_values() {
+    let mut report = report(Verdict::Unknown);
+    let html = page("set-003", &report);
+    assert!(html.contains("falling with the distance</td><td>87 %</td><td>strength 0.000853 N m²</td>"), "{html}");
+    report.lacking_force.as_mut().unwrap().terms.clear();
+    assert!(page("set-003", &report).contains("It follows no term that was tried"));
+    report.lacking_force = None;
+    assert!(!page("set-003", &report).contains("The force that is lacking"));
 }
 
 #[test]
