@@ -58,7 +58,7 @@ pub struct Settings {
     pub rollouts: usize,
     /// After this many fits end where they are.
     pub most: usize,
-    /// No fit of an effect begins a simulation that would end above this many; what is decided, drawn and told of the last ones adds up to 160.
+    /// No fit of an effect begins a simulation that would end above this many; what is decided, drawn and told of the last ones adds up to 160, and what is lacking is looked at in 20 more.
     pub limit: usize,
     /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story. Of the
     /// fitted episodes that are above it before anything is named, what is named has to close half of a typical one's gap, too.

@@ -107,7 +107,7 @@ pub struct Report {
     pub summary: String,
     /// Named effects, in the order in which they were accepted.
     pub effects: Vec<NamedEffect>,
-    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first, or more likely by all episodes, but held-out ones spoke against them. Where nothing is named, what the evidence leans to, by too
+    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first, those with more evidence that did not convince among them, weighed by all episodes. Where nothing is named, what the evidence leans to, by too
     /// little or without lasting: the best rival that gains anything, and those as near to it.
     pub confusion_set: Vec<&'static str>,
     /// Fitted rivals of the first round, those among them that gain more than what was named but explain held-out episodes worse.
@@ -319,9 +319,14 @@ fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEff
     let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
     let named = effects.first().map(|first| first.log_evidence);
     let passed = round.passed_over(&diagnosis.heldout_counts);
-    let passed = passed.iter().map(|(kind, more)| (kind.name(), named.unwrap_or(0.0) + more));
-    let gains = round.rivals.iter().map(|rival| (rival.kind().name(), rival.gain)).chain(passed);
-    near_the_first(gains, named, settings.near())
+    let first = named.or_else(|| round.rivals.first().map(|rival| rival.gain)).unwrap_or(0.0);
+    let passed = passed.iter().map(|(kind, more)| (kind.name(), first + more));
+    let mut gains: Vec<(&str, f64)> = round.rivals.iter().map(|rival| (rival.kind().name(), rival.gain)).collect();
+    gains.extend(passed);
+    if named.is_none() {
+        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+    }
+    near_the_first(gains.into_iter(), named, settings.near())
 }
 
 /// Of rivals, the most probable first, those nearer than this to what was named; where nothing was, to the first of those that gain anything.

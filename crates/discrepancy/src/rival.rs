@@ -38,7 +38,7 @@ pub struct Round {
     pub promises: Vec<Promise>,
     /// The fitted ones, the most probable first.
     pub rivals: Vec<Rival>,
-    /// Those with more evidence than the first one that did not convince, as far as they were dropped for it.
+    /// Those before the first one that convinced: more evidence, but what was held out, or other resamples, spoke against them.
     pub passed_over: Vec<Rival>,
     /// The model that they were added to, with the same errors; of several effects that were fitted together the nominal one.
     pub base: Fit,

@@ -179,6 +179,8 @@ impl Search<'_> {
             let model = rival.fit.model.with(&added);
             self.affords(&part, &model).then(|| fit(&part, model, Begin::at(&x), Effort::Quick))
         };
+        // Beside a second effect what spoke against those passed over is another question.
+        first.passed_over.clear();
         let Some((lead, others)) = first.rivals.split_first_mut() else { return };
         let Some(as_found) = beside(lead) else { return };
         let mut best: Option<(usize, Fit)> = None;
@@ -380,7 +382,7 @@ impl Search<'_> {
             .and_then(|first| self.retuned(&round.base, &first.fit));
         if let Some(again) = again {
             let gained = again.log_evidence() - round.base.log_evidence();
-            round.rivals.iter_mut().for_each(|rival| rival.gain -= gained);
+            round.rivals.iter_mut().chain(&mut round.passed_over).for_each(|rival| rival.gain -= gained);
             round.before = self.heldout(&again);
             round.base = again;
         }

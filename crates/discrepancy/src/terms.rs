@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
+use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::fit::Fit;
 use crate::likelihood::mean_square;
@@ -14,21 +15,24 @@ use crate::trial::{Window, groups};
 
 /// Episodes that are simulated for it, the worst explained ones.
 const EPISODES: usize = 20;
-/// Terms, at most.
+/// Terms, at most, beside another friction.
 const TERMS: usize = 3;
 /// Parts that are left out in turn.
 const PARTS: usize = 5;
-/// A term has to gain so many standard errors of what it gains in single episodes: it is the best of some hundreds, most of which say nearly the same.
-const STANDARD_ERRORS: f64 = 3.0;
+/// Chance that a term gains as much in single episodes by luck, by Student's t: it is the best of some hundreds, most of which say nearly the same.
+const CHANCE: f64 = 0.001;
+/// Of terms that explain nearly as much as the best, to this share of all, the simplest is taken.
+const NEARLY: f64 = 0.02;
 /// Of an episode of which less than this share of a mean episode's square is left, little is gained.
 const FLOOR: f64 = 0.1;
 /// A term has to explain this share of all.
 const LEAST_SHARE: f64 = 0.03;
 /// Windows and episodes that say anything.
-const LEAST: [usize; 2] = [40, 5];
-/// Periods that are tried, s: the shortest and the longest, each a sixteenth longer than the one before.
-const PERIODS_SECS: [f64; 2] = [0.12, 2.0];
-/// The same of stripes on the table, m.
+const LEAST: [usize; 2] = [40, 6];
+/// Frequencies that are tried, Hz, in steps by which a few seconds lose less than a quarter of a period. All episodes are taken to begin at the same phase.
+const FREQUENCIES_HZ: [f64; 2] = [0.5, 8.3];
+const STEP_HZ: f64 = 0.05;
+/// Stripes on the table that are tried, m: the shortest and the longest, each a sixteenth longer than the one before.
 const WAVES_M: [f64; 2] = [0.03, 0.3];
 const NEXT: f64 = 1.0 + 1.0 / 16.0;
 /// Places along each axis of where the object was, and a tenth beyond, from which something may pull.
@@ -48,7 +52,7 @@ pub struct LackingForce {
     pub root_mean_square_n: f64,
     /// The same of what the sensors' noise alone makes, N.
     pub noise_n: f64,
-    /// Share of its weighted square that all terms explain in episodes left out.
+    /// Share of its square, weighted by what the sensors' noise leaves of a window, that all terms and another friction explain in episodes left out. The terms were chosen by it.
     pub explained_share: f64,
     /// Terms, the first that was found first; none where it follows none of the library.
     pub terms: Vec<FoundTerm>,
@@ -58,8 +62,8 @@ impl LackingForce {
     /// In words.
     pub(crate) fn sentence(&self) -> String {
         let lacks = format!(
-            "the re-tuned nominal model lacks a force on the object, {:.2} N (root mean square while it moves)",
-            self.root_mean_square_n
+            "the re-tuned nominal model lacks a force on the object, {:.2} N (root mean square beyond noise while it moves)",
+            (self.root_mean_square_n.powi(2) - self.noise_n.powi(2)).max(0.0).sqrt()
         );
         if self.terms.is_empty() {
             return format!("{lacks}, that follows no term that was tried");
@@ -168,7 +172,10 @@ impl Term {
         };
         let places = (0..PLACES * PLACES).map(|i| [at(0, i % PLACES), at(1, i / PLACES)]);
         all.extend(places.map(|place_m| Self::NearPlace { place_m }));
-        all.extend(steps(PERIODS_SECS).map(|period_secs| Self::Periodic { period_secs }));
+        let [lowest_hz, highest_hz] = FREQUENCIES_HZ;
+        let count = ((highest_hz - lowest_hz) / STEP_HZ) as usize;
+        let period_secs = |i: usize| 1.0 / (lowest_hz + STEP_HZ * i as f64);
+        all.extend((0..=count).map(|i| Self::Periodic { period_secs: period_secs(i) }));
         all
     }
 
@@ -271,7 +278,7 @@ impl Term {
             keys.iter().zip(values).map(|(key, value)| one(key, unit, *value)).collect()
         };
         const AXES: [&str; 3] = ["x", "y", "z"];
-        // k (p − a) as k (p − p̄) + c.
+        // −k (p − a) as −k (p − p̄) + c, with a = p̄ + c / k.
         let place = |at: [f64; 2]| vec![one("strength", "N/m", values[0]), one("x", "m", at[0]), one("y", "m", at[1])];
         let shift = |i: usize| if values[0] == 0.0 { 0.0 } else { values[i] / values[0] };
         match self {
@@ -417,17 +424,23 @@ fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
     let mut terms = vec![Term::AgainstMotion];
     let mut left = left_out(&normals(&terms))?;
     let mut shares = vec![1.0 - left.iter().sum::<f64>() / total];
+    let law = StudentsT::new(0.0, 1.0, (episodes.len() - 1) as f64).ok()?;
+    let least = law.inverse_cdf(1.0 - CHANCE);
     while terms.len() <= TERMS {
         let tried = library.iter().filter(|term| !terms.iter().any(|other| other.name() == term.name()));
-        let best = tried
+        let sure: Vec<(f64, Term, Vec<f64>)> = tried
             .filter_map(|term| {
                 let with = [terms.as_slice(), &[*term]].concat();
                 let after = left_out(&normals(&with))?;
                 let gain: f64 = left.iter().zip(&after).map(|(before, after)| before - after).sum();
-                let sure = gain > LEAST_SHARE * total && standing_out(&left, &after) > STANDARD_ERRORS;
+                let sure = gain > LEAST_SHARE * total && standing_out(&left, &after) > least;
                 sure.then_some((gain, *term, after))
             })
-            .max_by(|a, b| a.0.total_cmp(&b.0));
+            .collect();
+        let most = sure.iter().map(|tried| tried.0).fold(0.0, f64::max);
+        let width = |term: &Term| term.columns(&episodes[0][0], &middle).len();
+        let near = sure.into_iter().filter(|tried| tried.0 > most - NEARLY * total);
+        let best = near.min_by(|a, b| width(&a.1).cmp(&width(&b.1)).then(b.0.total_cmp(&a.0)));
         let Some((gain, term, after)) = best else { break };
         terms.push(term);
         shares.push(gain / total);

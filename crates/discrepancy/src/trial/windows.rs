@@ -19,13 +19,16 @@ const SLOPES_SECS: [f64; 3] = [0.2, 0.4, 0.8];
 const LEAST_SPEED_MPS: f64 = 0.001;
 /// The same in standard deviations of a velocity.
 const LEAST_SPEED_SIGMAS: f64 = 3.0;
+/// A tool that feels less than this, N, or so many standard deviations of a window's mean, touches nothing, whatever the simulation says.
+const TOUCH_N: f64 = 0.1;
+const TOUCH_SIGMAS: f64 = 4.0;
 /// Rows of a window out of touch, at least.
 const LEAST_ROWS: usize = 5;
 
 /// A window. Base axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Window {
-    /// Its middle, from the first row of the episode or piece, s.
+    /// Its middle, as the log has it, s.
     pub(crate) time_secs: f64,
     /// The object as measured, m.
     pub(crate) place_m: [f64; 3],
@@ -42,12 +45,14 @@ pub(crate) struct Window {
 }
 
 /// What a row says.
+#[derive(Clone, Copy)]
 struct Row {
     time_secs: f64,
     phase: Phase,
     /// Measured place, and measured less simulated, m.
     place: Option<([f64; 3], [f64; 3])>,
-    /// Simulated velocity, m/s.
+    /// Simulated place, m, and velocity, m/s.
+    simulated_m: [f64; 3],
     simulated_mps: [f64; 3],
     /// Measured less simulated, and simulated, N.
     force: Option<([f64; 3], [f64; 3])>,
@@ -84,9 +89,15 @@ impl Trial {
                 Some(false) => free_force(inside, mass_kg, place_sigma),
                 None => None,
             };
-            let turned = |velocity: [f64; 3]| otherwise(inside, velocity, friction_n);
+            // Out of touch what slides stops soon: how it moves its own window has to say.
+            let near = if pushed == Some(true) { &rows[..] } else { inside };
+            let motion = velocity(near, time_secs, place_sigma).or_else(|| simulated_motion(&rows, inside, time_secs));
+            let slides = pushed == Some(false) && friction_n > 0.0;
+            let stops = slides && inside.iter().any(|row| norm(row.simulated_mps) < LEAST_SPEED_MPS);
+            let turned = |velocity: [f64; 3]| otherwise(inside, velocity, friction_n).filter(|_| !stops);
             if let Some((mut lacking_n, variance_n2, simulated_n)) = lacking
-                && let Some((place_m, velocity_mps)) = velocity(&rows, time_secs, place_sigma)
+                && touched(inside, force_sigma).is_none_or(|touched| Some(touched) == pushed)
+                && let Some((place_m, velocity_mps)) = motion
                 && let Some(turned_n) = turned(velocity_mps)
             {
                 (0..3).for_each(|i| lacking_n[i] += turned_n[i]);
@@ -102,7 +113,9 @@ impl Trial {
         match (phase, self.tool_m.is_some()) {
             (Phase::ContactOnset, _) | (Phase::FreeMotion, true) => None,
             (Phase::Sliding | Phase::Rolling, true) => Some(true),
-            (Phase::AfterContact, true) | (_, false) => Some(false),
+            (Phase::AfterContact, true) | (Phase::FreeMotion, false) => Some(false),
+            // What meets a table bounces, tips and slides at once.
+            (_, false) => None,
         }
     }
 
@@ -122,9 +135,10 @@ impl Trial {
         let less = |(a, b): ([f64; 3], [f64; 3])| -> [f64; 3] { std::array::from_fn(|i| a[i] - b[i]) };
         (0..self.rows.len())
             .map(|row| Row {
-                time_secs: self.time_secs[row] - self.time_secs[0],
+                time_secs: self.time_secs[row],
                 phase: phases[row],
                 place: read(Kind::ObjectPosition, row).map(|both| (both.0, less(both))),
+                simulated_m: course.at(self.rows[row].0).object.position_m,
                 simulated_mps: course.at(self.rows[row].0).object.linear_mps,
                 force: read(Kind::WristForce, row).map(|both| (less(both), both.1)),
             })
@@ -160,8 +174,7 @@ fn otherwise(rows: &[Row], velocity_mps: [f64; 3], friction_n: f64) -> Option<[f
     if friction_n == 0.0 {
         return Some([0.0; 3]);
     }
-    let mean: [f64; 3] =
-        std::array::from_fn(|i| rows.iter().map(|row| row.simulated_mps[i]).sum::<f64>() / rows.len() as f64);
+    let mean = mean(rows, |row| row.simulated_mps);
     let [speed, simulated] = [velocity_mps, mean].map(|[x, y, _]| x.hypot(y));
     let way = |i: usize| velocity_mps[i] / speed - mean[i] / simulated;
     (simulated > LEAST_SPEED_MPS).then(|| [friction_n * way(0), friction_n * way(1), 0.0])
@@ -175,10 +188,35 @@ fn velocity(rows: &[Row], time_secs: f64, sigma: f64) -> Option<([f64; 3], [f64;
         let read: Vec<(f64, [f64; 3])> =
             near.filter_map(|row| Some((row.time_secs - time_secs, row.place?.0))).collect();
         let (curve, variance) = polynomial(&read, 1)?;
-        let speed = curve[1].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let speed = norm(curve[1]);
         let least = LEAST_SPEED_MPS.max(LEAST_SPEED_SIGMAS * sigma * variance[1].sqrt());
         (speed > least).then_some((curve[0], curve[1]))
     })
+}
+
+/// The same as simulated, where hardly any place was measured nearby: of some pushes only the first and the last are.
+fn simulated_motion(rows: &[Row], inside: &[Row], time_secs: f64) -> Option<([f64; 3], [f64; 3])> {
+    let near = |row: &&Row| row.place.is_some() && (row.time_secs - time_secs).abs() <= 0.5 * SLOPES_SECS[2];
+    let velocity_mps = mean(inside, |row| row.simulated_mps);
+    (norm(velocity_mps) > LEAST_SPEED_MPS && rows.iter().filter(near).count() < 3)
+        .then(|| (mean(inside, |row| row.simulated_m), velocity_mps))
+}
+
+/// Whether the sensor says that something touches the tool; `None` without one.
+fn touched(rows: &[Row], sigma: f64) -> Option<bool> {
+    let read = rows.iter().filter_map(|row| row.force);
+    let (count, sum) = read.fold((0.0, [0.0; 3]), |(count, sum): (f64, [f64; 3]), (less, simulated)| {
+        (count + 1.0, std::array::from_fn(|i| sum[i] + less[i] + simulated[i]))
+    });
+    (count > 0.0).then(|| norm(sum) / count > TOUCH_N.max(TOUCH_SIGMAS * sigma / count.sqrt()))
+}
+
+fn mean(rows: &[Row], pick: fn(&Row) -> [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| rows.iter().map(|row| pick(row)[i]).sum::<f64>() / rows.len() as f64)
+}
+
+fn norm(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// Least squares through vectors at times, in powers of the time: coefficients, and their variances where readings have variance 1.
@@ -219,12 +257,24 @@ mod tests {
                 time_secs: t,
                 phase: Phase::AfterContact,
                 place: Some(([t, 0.0, 0.0], [0.0, 0.5 * 1.5 * t * t, 0.0])),
+                simulated_m: [t, 0.0, 0.0],
                 simulated_mps: [1.0, 0.0, 0.0],
                 force: None,
             })
             .collect();
         let (force, variance, _) = free_force(&rows, 0.4, 0.000_5).unwrap();
         assert!((force[1] - 0.6).abs() < 1e-9 && force[0].abs() < 1e-9, "{force:?}");
+        // What no sensor saw on its way goes where it is simulated to go; what is seen does not.
+        assert!(simulated_motion(&rows, &rows, 0.05).is_none());
+        let unseen: Vec<Row> = rows.iter().map(|row| Row { place: None, ..*row }).collect();
+        let (place, velocity) = simulated_motion(&unseen, &unseen, 0.05).unwrap();
+        assert!((place[0] - 0.055).abs() < 1e-12 && velocity == [1.0, 0.0, 0.0], "{place:?}");
+        // A tool that reads 2 N where 3 were simulated touches something, one that reads nothing lost it.
+        let feels = |less: f64| {
+            let force = Some(([less, 0.0, 0.0], [3.0, 0.0, 0.0]));
+            touched(&rows.iter().map(|row| Row { force, ..*row }).collect::<Vec<_>>(), 0.05)
+        };
+        assert_eq!((feels(-1.0), feels(-3.0), touched(&rows, 0.05)), (Some(true), Some(false), None));
         // Where it goes along y what its friction does along x is missing, and the other way round.
         let turned = otherwise(&rows, [0.0, 0.02, 0.0], 2.0).unwrap();
         assert!((turned[0] + 2.0).abs() < 1e-12 && (turned[1] - 2.0).abs() < 1e-12, "{turned:?}");
