@@ -42,7 +42,7 @@ pub fn mean_square(residuals: &[DVector<f64>]) -> f64 {
 /// Share of episodes that may go another way than any model.
 const ODD: f64 = 0.25;
 
-/// The mean of all but the largest [`ODD`] of them: an odd episode is not explained by the truth either.
+/// The mean of all but the largest `ODD` of them: an odd episode is not explained by the truth either.
 #[must_use]
 pub fn trimmed_mean(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);

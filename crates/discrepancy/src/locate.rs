@@ -52,7 +52,7 @@ struct Sums {
 /// The cells of a fit, the largest share first.
 ///
 /// Whether a cell stands out is judged between episodes, never between samples: an episode's excess is the logarithm of its mean square, drawn
-/// towards 0 where it has few residuals, so that one odd episode does not hide what all show (see [`chances`]).
+/// towards 0 where it has few residuals, so that one odd episode does not hide what all show (see `chances`).
 #[must_use]
 pub fn locate(simulator: &Simulator, chosen: &[usize], fit: &Fit, seed: u64) -> Vec<Cell> {
     let (rolls, gravity_mps2) = (simulator.nominal.rolls(), simulator.nominal.header().gravity_mps2);
