@@ -14,6 +14,7 @@
 //!    ([`locate`]), or another one promises enough, the search goes on beside it; where it still does, and much of the gap is open, the verdict is `unknown`. Of what is thrown
 //!    up to four are looked for in a part of the episodes, and fitted to all together.
 //! 6. [`report`]: where ([`locate`]), what, how sure ([`interval`]), before and after, what to record next ([`separate`]).
+//!    Of an unknown gap what the force that is lacking follows ([`terms`]).
 //!
 //! The same log, seed and version give the same answer, whatever the number of threads.
 //!
