@@ -236,38 +236,38 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
     }
 }
 
-/// Slim upright bodies, fixed and movable, where something seems to stand in the way.
+/// A slim upright body, fixed and movable.
+pub(crate) fn bodies((place, radius_m): &Place) -> impl Iterator<Item = EffectConfig> {
+    let start = [place[0], place[1], 0.0, *radius_m, 0.08, 0.0, 1.0];
+    let slim =
+        |base: &EffectConfig| matches!(base, EffectConfig::HiddenObstacle(body) if body.shape == ObjectShape::Cylinder);
+    let choices = EffectKind::HiddenObstacle.variants().into_iter().filter(slim);
+    choices.filter_map(move |base| base.with_parameters(&start).ok())
+}
+
+/// The same where something seems to stand in the way.
 fn obstacles(context: &Context) -> Vec<Candidate> {
-    let choices = EffectKind::HiddenObstacle.variants();
-    let mut all = Vec::new();
-    for (place, radius_m) in &context.obstacles_m {
-        for base in &choices {
-            let EffectConfig::HiddenObstacle(choice) = base else { continue };
-            if choice.shape != ObjectShape::Cylinder {
-                continue;
-            }
-            let start = [place[0], place[1], 0.0, *radius_m, 0.08, 0.0, 1.0];
-            let Ok(base) = base.with_parameters(&start) else { continue };
-            let unit = |index: usize, unit: f64, range: [f64; 2]| Coordinate {
-                index,
-                origin: start[index],
-                unit,
-                range,
-                strength: index == 3,
-            };
-            let mut coordinates = vec![
-                unit(0, OBSTACLE_M, [-5.0, 5.0]),
-                unit(1, OBSTACLE_M, [-5.0, 5.0]),
-                unit(3, 0.5 * OBSTACLE_M, [(0.01 - radius_m) / (0.5 * OBSTACLE_M), 5.0]),
-            ];
-            if choice.movable {
-                coordinates.push(unit(6, 0.6, [-1.5, 6.0]));
-            }
-            let begin = Some(vec![0.0; coordinates.len()]);
-            all.push(Candidate { base, coordinates, begin, reach: REACH });
+    let candidate = |base: EffectConfig| {
+        let start = base.values();
+        let unit = |index: usize, unit: f64, range: [f64; 2]| Coordinate {
+            index,
+            origin: start[index],
+            unit,
+            range,
+            strength: index == 3,
+        };
+        let mut coordinates = vec![
+            unit(0, OBSTACLE_M, [-5.0, 5.0]),
+            unit(1, OBSTACLE_M, [-5.0, 5.0]),
+            unit(3, 0.5 * OBSTACLE_M, [(0.01 - start[3]) / (0.5 * OBSTACLE_M), 5.0]),
+        ];
+        if matches!(&base, EffectConfig::HiddenObstacle(body) if body.movable) {
+            coordinates.push(unit(6, 0.6, [-1.5, 6.0]));
         }
-    }
-    all
+        let begin = Some(vec![0.0; coordinates.len()]);
+        Candidate { base, coordinates, begin, reach: REACH }
+    };
+    context.obstacles_m.iter().flat_map(bodies).map(candidate).collect()
 }
 
 fn coordinates(base: &EffectConfig, context: &Context) -> Vec<Coordinate> {

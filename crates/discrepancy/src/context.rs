@@ -1,6 +1,7 @@
 //! What is known of a log before any effect is tried.
 
 use measured_log::Log;
+use nalgebra::DVector;
 use physics_model::{ObjectShape, ObjectTheta};
 use rayon::prelude::*;
 
@@ -9,7 +10,9 @@ use crate::fit::Fit;
 use crate::noise::NoiseLevels;
 use crate::obstacle::{self, Outlines, Place, distance};
 use crate::patch;
-use crate::simulator::{Nudge, Simulator};
+use crate::screen::EXPLAINED;
+use crate::simulator::Nudge;
+use crate::study::Study;
 use crate::trial::{Kind, Trial};
 
 /// Places that are tried for what is tied to one.
@@ -23,8 +26,8 @@ const OBSTACLES: usize = 5;
 const PATCHES: usize = 4;
 
 /// Where the object went and what the log has.
-pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
-    let nominal = simulator.nominal;
+pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels) -> Context {
+    let nominal = study.simulator.nominal;
     let engine = nominal.engine();
     let (world, theta) = nominal.rig(&null.x, &engine).nominal(&nominal.object(&null.x, 0.0, &engine));
     let has = |kind: Kind| noise.of(kind).is_some();
@@ -44,7 +47,7 @@ pub(crate) fn context(simulator: &Simulator, null: &Fit, log: &Log, noise: &Nois
     }
     // Nothing that stands in the way is looked for where nothing pushes, and no forces tell of a patch.
     let (obstacles_m, patches_m) =
-        if nominal.has_tool() { placed(simulator, null, &theta.object) } else { Default::default() };
+        if nominal.has_tool() { placed(study, null, &theta.object) } else { Default::default() };
     Context {
         world,
         theta,
@@ -77,7 +80,8 @@ fn centres(points: &[[f64; 2]], count: usize) -> Vec<[f64; 2]> {
 }
 
 /// Places at which something may stand in the way, and where the table may be rougher or smoother.
-fn placed(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<Place>) {
+fn placed(study: &Study, null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<Place>) {
+    let simulator = study.simulator;
     let hypothesis = null.model.hypothesis(&null.x);
     let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
     let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
@@ -87,5 +91,15 @@ fn placed(simulator: &Simulator, null: &Fit, object: &ObjectTheta) -> (Vec<Place
         object_m: object.shape.footprint_radius_m(object.size_m),
         tool_m: simulator.nominal.header().tool_radius_m.unwrap_or(0.0),
     };
-    (obstacle::places(&courses, outlines, OBSTACLES), patch::places(&courses, outlines, PATCHES))
+    let seen = obstacle::Seen::new(&courses, outlines);
+    let mut obstacles_m = seen.places(OBSTACLES);
+    let explained = |residuals: &&DVector<f64>| residuals.norm_squared() < EXPLAINED * residuals.len() as f64;
+    // A body in the way leaves most episodes as they are.
+    if 2 * null.residuals.iter().filter(explained).count() >= null.residuals.len()
+        && let Some(voted) = obstacles_m.first().copied()
+        && let Some(closer) = obstacle::closer(study, null, &seen, voted)
+    {
+        obstacles_m.insert(0, closer);
+    }
+    (obstacles_m, patch::places(&courses, outlines, PATCHES))
 }

@@ -189,7 +189,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let mut x = first.x;
     x.resize(model.count(), 0.0);
     let null = fit(&part, model, Begin::at(&x), Effort::Quick);
-    let context = context(&simulator, &null, log, &noise);
+    let context = context(&study, &null, log, &noise);
     let screening = Screening::new(&part, places, &null, &candidates(&context));
     let kept = Study::new(&simulator, engine, heldout);
     let mut search = Search { study, kept, part, settings, reserve: 0 };

@@ -8,6 +8,10 @@ use physics_model::rig::RigReading;
 
 use crate::trial::{Happened, Trial};
 
+mod closer;
+
+pub(crate) use closer::closer;
+
 /// Distance of grid points, m.
 const GRID_M: f64 = 0.01;
 /// Radii of what is looked for, m.
@@ -96,11 +100,35 @@ impl Outlines {
 /// Where something may stand, m, and its radius, m.
 pub type Place = ([f64; 2], f64);
 
-/// Places, the likeliest first, at most `count`. Each trial comes with its simulated readings.
-#[must_use]
-pub fn places(trials: &[(&Trial, Vec<RigReading>)], outlines: Outlines, count: usize) -> Vec<Place> {
-    let witness = |(trial, readings): &(&Trial, Vec<RigReading>)| witness(&trial.happened(readings), outlines);
-    most_voted(&trials.iter().map(witness).collect::<Vec<_>>(), outlines, count)
+/// What all episodes say, one after another.
+pub(crate) struct Seen {
+    witnesses: Vec<Witness>,
+    outlines: Outlines,
+}
+
+impl Seen {
+    /// Each trial comes with its simulated readings.
+    pub(crate) fn new(trials: &[(&Trial, Vec<RigReading>)], outlines: Outlines) -> Self {
+        let witness = |(trial, readings): &(&Trial, Vec<RigReading>)| witness(&trial.happened(readings), outlines);
+        Self { witnesses: trials.iter().map(witness).collect(), outlines }
+    }
+
+    /// Places, the likeliest first, at most `count`.
+    pub(crate) fn places(&self, count: usize) -> Vec<Place> {
+        most_voted(&self.witnesses, self.outlines, count)
+    }
+
+    fn votes(&self, (place, radius_m): &Place) -> f64 {
+        self.witnesses.iter().map(|witness| witness.vote(*place, *radius_m, self.outlines)).sum()
+    }
+
+    /// How near, m, object or tool come to a body in an episode until something happens.
+    fn apart_m(&self, episode: usize, (place, radius_m): Place) -> f64 {
+        let witness = &self.witnesses[episode];
+        let rows = witness.before.iter().chain(witness.event.as_ref().map(|event| &event.row));
+        let apart_m = |row| self.outlines.off_object(place, row).min(self.outlines.off_tool(place, row));
+        rows.map(apart_m).fold(f64::INFINITY, f64::min) - radius_m
+    }
 }
 
 fn most_voted(witnesses: &[Witness], outlines: Outlines, count: usize) -> Vec<Place> {

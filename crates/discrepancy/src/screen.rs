@@ -15,7 +15,7 @@ const EPISODES: usize = 10;
 /// The same of what is thrown, which lacks several effects: each toss meets the table more than once.
 const EPISODES_THROWN: usize = 8;
 /// Mean square of an episode that is explained.
-const EXPLAINED: f64 = 1.4;
+pub(crate) const EXPLAINED: f64 = 1.4;
 /// An episode lasts long if it does so many times as long as the mean.
 const LONG: f64 = 3.0;
 
@@ -128,7 +128,7 @@ impl Screening {
 
 /// By how much a body in the way explains episodes better. One that neither explains says nothing: a millimetre beside its place an object that meets it
 /// may go another way, but what went by freely still has to.
-fn met(before: &Stack, after: &Stack) -> f64 {
+pub(crate) fn met(before: &Stack, after: &Stack) -> f64 {
     let gain = |(before, after): (&DVector<f64>, &DVector<f64>)| {
         let [a, b] =
             [before, after].map(|residuals| likelihood::episode_cost(residuals.norm_squared(), residuals.len()));
