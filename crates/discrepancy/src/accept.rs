@@ -26,12 +26,16 @@ const STEADY: f64 = 2.5;
 
 /// Share of what the fitted episodes gain that the held-out ones have to there.
 const KEPT: f64 = 0.1;
+/// The same where the gain is not plain.
+const MOSTLY_KEPT: f64 = 0.5;
 
 /// What is asked of an effect.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asked {
     /// Least gain in ln evidence.
     pub(crate) least: f64,
+    /// A gain below this might be what the solver does wrong: held-out episodes have to gain most of what the fitted ones do.
+    pub(crate) plain: f64,
     /// Whether held-out episodes have to gain a tenth of what the fitted ones do.
     pub(crate) kept: bool,
     /// Whether most episodes have to gain, and held-out ones to have a gap: a ball goes another way at the least provocation, and what explains some of
@@ -119,7 +123,11 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
     let slack = HELDOUT_SLACK.max(share * rival.gain);
     // What the fitted episodes gained the held-out ones should, too.
     let expected = fitted.iter().sum::<f64>() * episodes.heldout.len() as f64 / episodes.fitted.len().max(1) as f64;
-    let kept = !asked.kept || heldout.iter().sum::<f64>() > KEPT * expected;
+    let least_kept = match (rival.gain < asked.plain, asked.kept) {
+        (true, _) => Some(MOSTLY_KEPT),
+        (false, kept) => kept.then_some(KEPT),
+    };
+    let kept = least_kept.is_none_or(|share| heldout.iter().sum::<f64>() > share * expected);
     let gap = round.before.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
     let steady = !asked.steady || (gap && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
     steady && kept && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * asked.least
@@ -166,7 +174,7 @@ mod tests {
     fn a_pair_is_compared_with_no_effect_not_with_the_first_one() {
         let pieces = |count: usize| (0..count).map(|place| place..place + 1).collect();
         let episodes = Episodes { fitted: pieces(4), heldout: pieces(2), counts: vec![20; 2] };
-        let asked = Asked { least: 10.0, kept: false, steady: false };
+        let asked = Asked { least: 10.0, plain: 0.0, kept: false, steady: false };
         assert!(both_convince([&round(3.0, 2.5), &round(2.5, 1.0)], &episodes, asked));
         // Held-out episodes that the first one spoilt and the second does not mend.
         let mut second = round(2.5, 1.0);

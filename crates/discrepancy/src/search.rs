@@ -18,8 +18,9 @@ use crate::study::Study;
 
 mod retune;
 
-/// What a further effect has to gain, as a share of what those before it did.
+/// What a further effect has to gain, as a share of what those before it did; less, down to the latter, where held-out episodes gain as well.
 const SECOND_SHARE: f64 = 0.01;
+const LEAST_SECOND_SHARE: f64 = 0.0025;
 /// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
 const NEAR: f64 = 60.0;
 /// What promises less than this share of what another one gains is not fitted...
@@ -128,7 +129,8 @@ impl Search<'_> {
         let rolls = self.study.simulator.nominal.rolls();
         let threshold = if rolls { self.settings.threshold_rolling } else { self.settings.threshold };
         // The errors of a solver grow with what it is asked to explain.
-        Asked { least: threshold.max(SECOND_SHARE * explained), kept: rolls, steady: rolls }
+        let [least, plain] = [LEAST_SECOND_SHARE, SECOND_SHARE].map(|share| threshold.max(share * explained));
+        Asked { least, plain, kept: rolls, steady: rolls }
     }
 
     /// The round of a second effect beside the first rival, which does not convince alone, if both do together: the rivals before that one are dropped then.
