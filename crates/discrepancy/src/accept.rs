@@ -34,7 +34,7 @@ const MOSTLY_KEPT: f64 = 0.5;
 pub(crate) struct Asked {
     /// Least gain in ln evidence.
     pub(crate) least: f64,
-    /// A gain below this might be what the solver does wrong: held-out episodes have to gain most of what the fitted ones do.
+    /// A gain below this might be made of what single episodes do: each held-out one has to gain at least half as much as a fitted one.
     pub(crate) plain: f64,
     /// Whether held-out episodes have to gain a tenth of what the fitted ones do.
     pub(crate) kept: bool,
@@ -130,7 +130,8 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
     let kept = least_kept.is_none_or(|share| heldout.iter().sum::<f64>() > share * expected);
     let gap = round.before.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
     let steady = !asked.steady || (gap && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
-    steady && kept && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * asked.least
+    let least = if rival.gain < asked.plain { asked.least } else { asked.plain };
+    steady && kept && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * least
 }
 
 /// Of a sum of independent gains that scatter as these do.
@@ -180,6 +181,38 @@ mod tests {
         let mut second = round(2.5, 1.0);
         second.rivals[0].heldout = vec![20.0 * 9.0; 2];
         assert!(!both_convince([&round(3.0, 2.5), &second], &episodes, asked));
+    }
+
+    #[test]
+    fn a_gain_that_is_not_plain_has_to_be_kept_by_what_was_held_out() {
+        let pieces = |count: usize| (0..count).map(|place| place..place + 1).collect();
+        let episodes = Episodes { fitted: pieces(4), heldout: pieces(2), counts: vec![20; 2] };
+        let mut round = round(1.5, 1.0);
+        let gain = round.rivals[0].gain;
+        let agrees = |round: &Round, plain: f64| {
+            agrees(&round.rivals[0], round, &episodes, Asked { least: 5.0, plain, kept: false, steady: false })
+        };
+        assert!(agrees(&round, 2.0 * gain) && agrees(&round, 0.5 * gain));
+        // Held-out episodes that gain a third as much each: enough for what is plain.
+        round.rivals[0].heldout = vec![20.0 * 1.33 * 1.33; 2];
+        assert!(!agrees(&round, 2.0 * gain) && agrees(&round, 0.5 * gain));
+    }
+
+    #[test]
+    fn what_one_episode_shows_is_no_plain_gain() {
+        let pieces = |count: usize| (0..count).map(|place| place..place + 1).collect();
+        let episodes = Episodes { fitted: pieces(4), heldout: pieces(2), counts: vec![20; 2] };
+        let mut round = round(3.0, 3.0);
+        round.rivals[0].fit.residuals[0] = DVector::from_element(20, 0.5);
+        round.rivals[0].fit.residuals[1] = DVector::from_element(20, 2.5);
+        // 42 of the 47 it gains are of one episode.
+        let gain = round.rivals[0].fit.log_evidence() - round.base.log_evidence();
+        round.rivals[0].gain = gain;
+        let agrees = |plain: f64| {
+            agrees(&round.rivals[0], &round, &episodes, Asked { least: 5.0, plain, kept: false, steady: false })
+        };
+        assert!(!agrees(40.0), "{gain}");
+        assert!(agrees(5.0));
     }
 
     #[test]

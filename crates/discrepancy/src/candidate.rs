@@ -371,6 +371,14 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_body_is_tried_fixed_and_then_movable() {
+        let moves = |body: EffectConfig| matches!(body, EffectConfig::HiddenObstacle(body) if body.movable);
+        assert_eq!(bodies(&([0.1, -0.2], 0.03)).map(moves).collect::<Vec<_>>(), [false, true]);
+        let [x, y, _, radius, ..] = bodies(&([0.1, -0.2], 0.03)).next().unwrap().values()[..] else { panic!() };
+        assert_eq!([x, y, radius], [0.1, -0.2, 0.03]);
+    }
+
+    #[test]
     fn soft_contacts_are_looked_for_where_they_are_soft() {
         let all = candidates(&context());
         let of = |kind| all.iter().filter(move |candidate| candidate.kind() == kind);

@@ -18,7 +18,7 @@ const LEAST: usize = 2;
 
 /// What a link has to gain, as a share of what those before it did: errors of all of them are at their size in all others. Of 32 simulated logs of one to
 /// three effects spurious ones gained up to 2.6 %, true ones 4.5 % and more.
-const LEAST_SHARE: f64 = 0.03;
+pub(crate) const LEAST_SHARE: f64 = 0.03;
 
 /// Coordinates of an effect of what is thrown, and kinds that are fitted beside another one: most have fewer.
 const COORDINATES: usize = 3;
@@ -61,7 +61,7 @@ impl Search<'_> {
             }
             let mut link = self.link(screening, &part, &at);
             let gain = self.share(screening) * link.gain();
-            let least = self.asked(gained).least.max(LEAST_SHARE * gained);
+            let least = self.asked(gained).least;
             link.holds = gain > least && link.quick.first().is_some_and(|best| self.lasts_in(best, &part));
             let best = link.quick.first().filter(|_| link.holds).cloned();
             links.push(link);

@@ -1,16 +1,15 @@
 //! What is known of a log before any effect is tried.
 
 use measured_log::Log;
-use nalgebra::DVector;
 use physics_model::{ObjectShape, ObjectTheta};
 use rayon::prelude::*;
 
 use crate::candidate::Context;
 use crate::fit::Fit;
+use crate::likelihood::explained;
 use crate::noise::NoiseLevels;
 use crate::obstacle::{self, Outlines, Place, distance};
 use crate::patch;
-use crate::screen::EXPLAINED;
 use crate::simulator::Nudge;
 use crate::study::Study;
 use crate::trial::{Kind, Trial};
@@ -93,13 +92,12 @@ fn placed(study: &Study, null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<P
     };
     let seen = obstacle::Seen::new(&courses, outlines);
     let mut obstacles_m = seen.places(OBSTACLES);
-    let explained = |residuals: &&DVector<f64>| residuals.norm_squared() < EXPLAINED * residuals.len() as f64;
     // A body in the way leaves most episodes as they are.
-    if 2 * null.residuals.iter().filter(explained).count() >= null.residuals.len()
-        && let Some(voted) = obstacles_m.first().copied()
-        && let Some(closer) = obstacle::closer(study, null, &seen, voted)
+    let untouched = null.residuals.iter().filter(|residuals| explained(residuals)).count();
+    if 2 * untouched >= null.residuals.len()
+        && let Some(likeliest) = obstacles_m.first_mut()
     {
-        obstacles_m.insert(0, closer);
+        *likeliest = obstacle::refined_place(study, null, &seen, *likeliest).unwrap_or(*likeliest);
     }
     (obstacles_m, patch::places(&courses, outlines, PATCHES))
 }

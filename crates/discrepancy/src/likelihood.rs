@@ -39,6 +39,15 @@ pub fn mean_square(residuals: &[DVector<f64>]) -> f64 {
     residuals.iter().map(DVector::norm_squared).sum::<f64>() / count.max(1) as f64
 }
 
+/// Mean square of an episode that is explained.
+const EXPLAINED: f64 = 1.4;
+
+/// Whether a model explains an episode.
+#[must_use]
+pub fn explained(residuals: &DVector<f64>) -> bool {
+    residuals.norm_squared() < EXPLAINED * residuals.len() as f64
+}
+
 /// Share of episodes that may go another way than any model.
 const ODD: f64 = 0.25;
 

@@ -8,9 +8,9 @@ use physics_model::rig::RigReading;
 
 use crate::trial::{Happened, Trial};
 
-mod closer;
+mod refine;
 
-pub(crate) use closer::closer;
+pub(crate) use refine::refined_place;
 
 /// Distance of grid points, m.
 const GRID_M: f64 = 0.01;
@@ -122,9 +122,9 @@ impl Seen {
         self.witnesses.iter().map(|witness| witness.vote(*place, *radius_m, self.outlines)).sum()
     }
 
-    /// How near, m, object or tool come to a body in an episode until something happens.
-    fn apart_m(&self, episode: usize, (place, radius_m): Place) -> f64 {
-        let witness = &self.witnesses[episode];
+    /// How near, m, object or tool come to a body in a trial until something happens; below 0 where they would be in it.
+    fn apart_m(&self, trial: usize, (place, radius_m): Place) -> f64 {
+        let witness = &self.witnesses[trial];
         let rows = witness.before.iter().chain(witness.event.as_ref().map(|event| &event.row));
         let apart_m = |row| self.outlines.off_object(place, row).min(self.outlines.off_tool(place, row));
         rows.map(apart_m).fold(f64::INFINITY, f64::min) - radius_m
@@ -334,6 +334,22 @@ mod tests {
         assert_eq!(passing.vote(body.0, body.1, OUTLINES), -PASSED);
         assert_eq!(passing.vote([0.3, 0.3], body.1, OUTLINES), 0.0);
         assert!(most_voted(&[passing], OUTLINES, 3).is_empty());
+    }
+
+    #[test]
+    fn a_push_comes_as_near_to_a_body_as_it_is_seen_to() {
+        let seen = |rows: &[Happened]| Seen { witnesses: vec![witness(rows, OUTLINES)], outlines: OUTLINES };
+        let near = |seen: &Seen, place| seen.apart_m(0, (place, 0.02));
+        // Along x the sides of the object are 3 cm away, and its tool is behind it.
+        let passing = seen(&push(0.0, [0.0, 0.0], None));
+        assert!((near(&passing, [0.0, 0.08]) - 0.03).abs() < 1e-9);
+        assert!(near(&passing, [0.0, 0.03]) < 0.0);
+        // What stops it is touched, what is behind that is not reached.
+        let body = ([0.0, 0.0], 0.02);
+        let stopped = seen(&push(0.0, [0.0, 0.0], Some(body)));
+        assert!(near(&stopped, body.0).abs() < 0.006, "{}", near(&stopped, body.0));
+        assert!(near(&stopped, [0.09, 0.0]) > 0.08);
+        assert_eq!(near(&seen(&[]), body.0), f64::INFINITY);
     }
 
     #[test]

@@ -14,8 +14,6 @@ use crate::study::{Study, difference};
 const EPISODES: usize = 10;
 /// The same of what is thrown, which lacks several effects: each toss meets the table more than once.
 const EPISODES_THROWN: usize = 8;
-/// Mean square of an episode that is explained.
-pub(crate) const EXPLAINED: f64 = 1.4;
 /// An episode lasts long if it does so many times as long as the mean.
 const LONG: f64 = 3.0;
 
@@ -132,8 +130,7 @@ pub(crate) fn met(before: &Stack, after: &Stack) -> f64 {
     let gain = |(before, after): (&DVector<f64>, &DVector<f64>)| {
         let [a, b] =
             [before, after].map(|residuals| likelihood::episode_cost(residuals.norm_squared(), residuals.len()));
-        let explained = before.norm_squared() < EXPLAINED * before.len() as f64;
-        if explained { a - b } else { (a - b).max(0.0) }
+        if likelihood::explained(before) { a - b } else { (a - b).max(0.0) }
     };
     before.iter().zip(after).map(gain).sum()
 }

@@ -6,7 +6,7 @@ use physics_model::EffectKind;
 use crate::accept::{Asked, Episodes, NEGLIGIBLE, better_heldout, both_convince, convinces, lasts, may_convince};
 use crate::begin::{begin, follow, promise_friction, shake};
 use crate::candidate::Candidate;
-use crate::chain::Link;
+use crate::chain::{LEAST_SHARE, Link};
 use crate::diagnosis::Settings;
 use crate::fit::{Begin, Effort, Fit, STEPS, fit};
 use crate::likelihood::{mean_square, trimmed_mean};
@@ -18,7 +18,8 @@ use crate::study::Study;
 
 mod retune;
 
-/// What a further effect has to gain, as a share of what those before it did; less, down to the latter, where held-out episodes gain as well.
+/// What a further effect has to gain, as a share of what those before it did; less, down to the latter, where held-out episodes gain as well. So 2 of 9 pairs of
+/// seeds 17 and 18 are found whose second effect gains less than a hundredth, and none of the 35 logs of seed 18 with one effect that gain most gets a second name.
 const SECOND_SHARE: f64 = 0.01;
 const LEAST_SECOND_SHARE: f64 = 0.0025;
 /// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
@@ -129,7 +130,9 @@ impl Search<'_> {
         let rolls = self.study.simulator.nominal.rolls();
         let threshold = if rolls { self.settings.threshold_rolling } else { self.settings.threshold };
         // The errors of a solver grow with what it is asked to explain.
-        let [least, plain] = [LEAST_SECOND_SHARE, SECOND_SHARE].map(|share| threshold.max(share * explained));
+        // Of what lacks more than two effects the first links of a chain are the strong ones.
+        let shares = if self.settings.effects > 2 { [LEAST_SHARE; 2] } else { [LEAST_SECOND_SHARE, SECOND_SHARE] };
+        let [least, plain] = shares.map(|share| threshold.max(share * explained));
         Asked { least, plain, kept: rolls, steady: rolls }
     }
 
