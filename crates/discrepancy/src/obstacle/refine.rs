@@ -3,7 +3,7 @@
 
 use physics_model::effect::EffectConfig;
 
-use super::{Place, RANGE_M, Seen, distance};
+use super::{Place, RANGE_M, Seen};
 use crate::candidate::bodies;
 use crate::fit::Fit;
 use crate::likelihood::{Stack, explained, mean_square};
@@ -15,12 +15,11 @@ const WORST: usize = 5;
 const OTHERS: usize = 3;
 /// How near, m, they come.
 const NEAR_M: f64 = 0.025;
-/// Distances, m, of a grid around what was voted; of its points those with most votes are simulated, at most so many, and so many of the best of them, which
-/// are farther apart than neighbours are, are moved.
+/// Distances, m, of a grid around what was voted; of its points those with most votes are simulated, at most so many, and so many of the best of them are moved.
+/// Neighbours may end in different places.
 const SPACING_M: f64 = 0.004;
 const SIMULATED: usize = 40;
 const MOVED: usize = 4;
-const APART_M: f64 = 1.1 * SPACING_M;
 /// Steps, m, by which they are moved and grown.
 const STEPS_M: [f64; 3] = [0.003, 0.001_5, 0.000_7];
 /// Simulated episodes after which the best so far is taken: the search for what is lacking needs the others.
@@ -81,7 +80,8 @@ pub(crate) fn refined_place(study: &Study, null: &Fit, seen: &Seen, voted: Place
     let movable: Vec<Tried> = found.iter().take(2 * MOVED).filter_map(|fixed| tried(fixed.place, 1, 0.0)).collect();
     found.extend(movable);
     sort(&mut found);
-    let moved = apart(found).into_iter().map(|begin| descend(begin, tried));
+    let begins = found.into_iter().take(MOVED).filter(|begin| begin.gain > 0.0);
+    let moved = begins.map(|begin| descend(begin, tried));
     let best = moved.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     Some(best.place).filter(|place| *place != voted)
 }
@@ -89,22 +89,6 @@ pub(crate) fn refined_place(study: &Study, null: &Fit, seen: &Seen, voted: Place
 /// The best first.
 fn sort(found: &mut [Tried]) {
     found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-}
-
-/// Of bodies that explain anything, the best first, those that are no neighbours of a better one.
-fn apart(found: Vec<Tried>) -> Vec<Tried> {
-    let mut chosen: Vec<Tried> = Vec::new();
-    for one in found.into_iter().filter(|one| one.gain > 0.0) {
-        let neighbours = |other: &Tried| {
-            other.body == one.body
-                && distance(other.place.0, one.place.0) < APART_M
-                && (other.place.1 - one.place.1).abs() < APART_M
-        };
-        if chosen.len() < MOVED && !chosen.iter().any(neighbours) {
-            chosen.push(one);
-        }
-    }
-    chosen
 }
 
 /// Moves and grows a body by smaller and smaller steps as long as it explains more.
@@ -161,6 +145,7 @@ fn choose(left: &[f64], apart_m: &[f64]) -> [Vec<usize>; 2] {
 
 #[cfg(test)]
 mod tests {
+    use super::super::distance;
     use super::*;
 
     #[test]
@@ -184,20 +169,5 @@ mod tests {
         assert_eq!(found.body, 1);
         // Out of budget it stays where it is.
         assert_eq!(descend(begin, |_, _, _| None).place, begin.place);
-    }
-
-    #[test]
-    fn neighbours_of_a_better_one_are_not_moved() {
-        let at = |x: f64, radius_m: f64, body: usize, gain: f64| Tried { gain, place: ([x, 0.0], radius_m), body };
-        let found = vec![
-            at(0.0, 0.02, 0, 9.0),
-            at(0.004, 0.02, 0, 8.0),
-            at(0.008, 0.02, 0, 7.0),
-            at(0.0, 0.03, 0, 6.0),
-            at(0.0, 0.02, 1, 5.0),
-            at(0.1, 0.02, 0, -1.0),
-        ];
-        let gains: Vec<f64> = apart(found).iter().map(|one| one.gain).collect();
-        assert_eq!(gains, [9.0, 7.0, 6.0, 5.0]);
     }
 }
