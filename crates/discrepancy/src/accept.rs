@@ -76,7 +76,7 @@ pub(crate) fn better_heldout(found: &[f64], other: &[f64], episodes: &Episodes) 
 }
 
 /// Whether each effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
-/// resamples, as wide as the intervals that are reported.
+/// resamples, as wide as the intervals that are reported; and it is no error of the engine.
 pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
     let mut samples = bootstrap(fit, groups, seed);
     widen(&mut samples, fit);
@@ -86,11 +86,12 @@ pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
             let own = first;
             first += part.coordinates.len();
             // A body in the way has no sign.
-            part.begin.is_some()
+            let lasts = part.begin.is_some()
                 || part.strengths().any(|index| {
                     let beyond = |sign: f64| samples.iter().filter(|x| sign * x[own + index] > NEGLIGIBLE).count();
                     beyond(1.0).max(beyond(-1.0)) as f64 >= SAME_SIGN * samples.len() as f64
-                })
+                });
+            lasts && !part.is_engine_error(&fit.x[own..first])
         })
 }
 
