@@ -18,9 +18,10 @@ const REACH: f64 = 0.35;
 const FAR: f64 = 1.2;
 /// Natural frequency of a soft contact, in that of the model's.
 const SOFT: f64 = 0.5;
-/// Contacts softer or stiffer by less than this factor are those of another engine. Of seeds 17 to 19 of the benchmark, whose logs come from contacts of 45 to 100 Hz,
+/// Contacts softer by less than this factor are those of another engine. Of seeds 17 to 19 of the benchmark, whose logs come from contacts of 45 to 100 Hz,
 /// three logs without an effect were told 43, 46 and 94 Hz, where the model has 60: what made them has 45, 45 and 80. Of effects, of 20 to 32 Hz, 34 Hz at most was found.
-const ENGINE_CONTACTS: f64 = 1.65;
+/// Of MuJoCo, whose contacts have about 130, five were told 139 to 315 Hz.
+const SOFTER: f64 = 1.65;
 /// Anisotropies that are tried along every axis.
 const AMPLITUDES: [f64; 2] = [0.04, 0.1];
 /// Limits of a force sensor, as shares of the largest force that was read, from one that acts along an axis to one along a space diagonal.
@@ -157,14 +158,14 @@ impl Candidate {
         }
     }
 
-    /// Whether at coordinates `a` the effect is one of the engine's own errors: contacts of a right model may be somewhat softer or stiffer than those of the
-    /// world (see [`crate::study`]), which is no discovery.
+    /// Whether at coordinates `a` the effect is one of the engine's own errors (see [`crate::study`]): contacts of another engine are somewhat softer, or stiffer by
+    /// whatever their steps allow, as bodies are. That is no discovery; what is much softer is.
     pub(crate) fn is_engine_error(&self, a: &[f64]) -> bool {
         let softness = self.coordinates.first().filter(|_| self.kind() == EffectKind::ContactCompliance);
         softness.is_some_and(|coordinate| {
             let scale = self.kind().parameters()[coordinate.index].scale;
             let value = self.effect(a).values()[coordinate.index];
-            (value / scale.value(coordinate.origin)).ln().abs() < ENGINE_CONTACTS.ln()
+            value * SOFTER > scale.value(coordinate.origin)
         })
     }
 
@@ -385,12 +386,12 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn contacts_a_little_softer_or_stiffer_are_another_engines() {
+    fn contacts_that_are_stiffer_or_a_little_softer_are_another_engines() {
         let all = candidates(&context());
         let soft = all.iter().find(|candidate| candidate.kind() == EffectKind::ContactCompliance).unwrap();
         let engine = |frequency_hz: f64| soft.is_engine_error(&soft.coordinates_of(&[frequency_hz, 5.0]));
-        assert!(engine(60.0) && engine(45.0) && engine(94.0));
-        assert!(!engine(34.0) && !engine(105.0));
+        assert!(engine(60.0) && engine(45.0) && engine(94.0) && engine(200.0));
+        assert!(!engine(34.0) && !engine(20.0));
         let tilt = all.iter().find(|candidate| candidate.kind() == EffectKind::TableTilt).unwrap();
         assert!(!tilt.is_engine_error(&[0.0, 0.0]));
     }
