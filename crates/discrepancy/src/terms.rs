@@ -165,6 +165,13 @@ fn standing_out(before: &[f64], after: &[f64]) -> f64 {
     mean / (variance / n).sqrt().max(1e-9)
 }
 
+/// From where to where something along an axis may pull, m: where the object was, and beyond.
+fn reach<'a>(windows: impl Iterator<Item = &'a Window>, axis: usize) -> [f64; 2] {
+    let wider = |[low, high]: [f64; 2], w: &Window| [low.min(w.place_m[axis]), high.max(w.place_m[axis])];
+    let [low, high] = windows.fold([f64::INFINITY, f64::NEG_INFINITY], wider);
+    [low - BEYOND * (high - low), high + BEYOND * (high - low)]
+}
+
 /// What is lacking, and what it follows; `None` where too little moves to say. `episodes`: the windows of each.
 fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
     let episodes: Vec<&Vec<Window>> = episodes.iter().filter(|windows| !windows.is_empty()).collect();
@@ -187,12 +194,7 @@ fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
     let normals = |terms: &[Term]| -> Vec<Normal> {
         episodes.iter().map(|windows| Normal::of(windows, terms, &middle, scatter_n2)).collect()
     };
-    let reach = |axis: usize| {
-        let fold = |start: f64, pick: fn(f64, f64) -> f64| all().map(|w| w.place_m[axis]).fold(start, pick);
-        let [low, high] = [fold(f64::INFINITY, f64::min), fold(f64::NEG_INFINITY, f64::max)];
-        [low - BEYOND * (high - low), high + BEYOND * (high - low)]
-    };
-    let [x, y] = [reach(0), reach(1)];
+    let [x, y] = [0, 1].map(|axis| reach(all(), axis));
     let library = Term::library(masses, [[x[0], y[0]], [x[1], y[1]]]);
     let total: f64 = normals(&[]).iter().map(|normal| normal.square).sum();
     // What re-tuning moves is no discovery: whatever else there is acts beside another friction.
