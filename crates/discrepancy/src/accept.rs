@@ -124,14 +124,14 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
     let slack = HELDOUT_SLACK.max(share * rival.gain);
     // What the fitted episodes gained the held-out ones should, too.
     let expected = fitted.iter().sum::<f64>() * episodes.heldout.len() as f64 / episodes.fitted.len().max(1) as f64;
-    let least_kept = match (rival.gain < asked.plain, asked.kept) {
-        (true, _) => Some(MOSTLY_KEPT),
-        (false, kept) => kept.then_some(KEPT),
+    let (least, least_kept) = if rival.gain < asked.plain {
+        (asked.least, Some(MOSTLY_KEPT))
+    } else {
+        (asked.plain, asked.kept.then_some(KEPT))
     };
     let kept = least_kept.is_none_or(|share| heldout.iter().sum::<f64>() > share * expected);
     let gap = round.before.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
     let steady = !asked.steady || (gap && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
-    let least = if rival.gain < asked.plain { asked.least } else { asked.plain };
     steady && kept && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * least
 }
 

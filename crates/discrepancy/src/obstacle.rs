@@ -115,7 +115,16 @@ impl Seen {
 
     /// Places, the likeliest first, at most `count`.
     pub(crate) fn places(&self, count: usize) -> Vec<Place> {
-        most_voted(&self.witnesses, self.outlines, count)
+        let Outlines { object_m, tool_m, .. } = self.outlines;
+        let events = self.witnesses.iter().filter_map(|witness| witness.event.as_ref());
+        let around = object_m.max(tool_m) + RADII_M[RADII_M.len() - 1] + TOLERANCE_M;
+        let pushed = events.map(|event| event.row.tool.filter(|_| event.tool).unwrap_or(event.row.object));
+        let Some((low, high)) = corners(pushed, around) else { return Vec::new() };
+        let votes = |place, radius_m| self.votes(&(place, radius_m));
+        let near = |a: &Place, b: &Place| (a.1 - b.1).abs() < WIDER_M && distance(a.0, b.0) < APART_M;
+        let places = best_places((low, high), GRID_M, &RADII_M, votes, near, count);
+        let same = |a: &Place, b: &Place| (a.1 - b.1).abs() < 0.5 * WIDER_M && distance(a.0, b.0) < WIDER_M;
+        finer_places(places, &FINER_M, RANGE_M, votes, same)
     }
 
     fn votes(&self, (place, radius_m): &Place) -> f64 {
@@ -129,18 +138,6 @@ impl Seen {
         let apart_m = |row| self.outlines.off_object(place, row).min(self.outlines.off_tool(place, row));
         rows.map(apart_m).fold(f64::INFINITY, f64::min) - radius_m
     }
-}
-
-fn most_voted(witnesses: &[Witness], outlines: Outlines, count: usize) -> Vec<Place> {
-    let events = || witnesses.iter().filter_map(|witness| witness.event.as_ref());
-    let around = outlines.object_m.max(outlines.tool_m) + RADII_M[RADII_M.len() - 1] + TOLERANCE_M;
-    let pushed = events().map(|event| event.row.tool.filter(|_| event.tool).unwrap_or(event.row.object));
-    let Some((low, high)) = corners(pushed, around) else { return Vec::new() };
-    let votes = |place, radius_m| witnesses.iter().map(|witness| witness.vote(place, radius_m, outlines)).sum::<f64>();
-    let near = |a: &Place, b: &Place| (a.1 - b.1).abs() < WIDER_M && distance(a.0, b.0) < APART_M;
-    let places = best_places((low, high), GRID_M, &RADII_M, votes, near, count);
-    let same = |a: &Place, b: &Place| (a.1 - b.1).abs() < 0.5 * WIDER_M && distance(a.0, b.0) < WIDER_M;
-    finer_places(places, &FINER_M, RANGE_M, votes, same)
 }
 
 /// Of circles on a grid between two corners those with the highest scores above 0, at most `count`, none near a better one.
@@ -187,25 +184,36 @@ pub(crate) fn finer_places(
     score: impl Fn([f64; 2], f64) -> f64,
     same: impl Fn(&Place, &Place) -> bool,
 ) -> Vec<Place> {
-    let move_to_best = |mut place: Place| {
-        let mut most = score(place.0, place.1);
-        for step_m in steps_m {
-            loop {
-                let ([x, y], radius_m) = place;
-                let moves =
-                    (0..27).map(|code| [code % 3, code / 3 % 3, code / 9].map(|n| step_m * (f64::from(n) - 1.0)));
-                let around = moves.map(|[dx, dy, dr]| ([x + dx, y + dy], radius_m + dr));
-                let within = around.filter(|place| (radii_m[0]..=radii_m[1]).contains(&place.1));
-                let best = within.map(|place| (score(place.0, place.1), place)).max_by(|a, b| a.0.total_cmp(&b.0));
-                match best {
-                    Some((better, next)) if better > most => (most, place) = (better, next),
-                    _ => break,
-                }
+    let scored = |place: Place| (score(place.0, place.1), place);
+    let around = |(_, place), step_m| circles(place, step_m, 1, radii_m).map(scored).collect();
+    let moved = places.into_iter().map(|place| climb(scored(place), steps_m, around, |(score, _)| *score));
+    best_apart(moved.collect(), same, usize::MAX)
+}
+
+/// A circle and its neighbours on a grid, so many to each side along both axes and in radius, as far as they are within a range of radii.
+fn circles(([x, y], radius_m): Place, grid_m: f64, count: u32, radii_m: [f64; 2]) -> impl Iterator<Item = Place> {
+    let across = 2 * count + 1;
+    (0..across.pow(3))
+        .map(move |code| {
+            let steps = [code % across, code / across % across, code / (across * across)];
+            let [dx, dy, dr] = steps.map(|n| grid_m * (f64::from(n) - f64::from(count)));
+            ([x + dx, y + dy], radius_m + dr)
+        })
+        .filter(move |place| (radii_m[0]..=radii_m[1]).contains(&place.1))
+}
+
+/// Goes to the best one around as long as that is better, by the first step, then by the next.
+fn climb<T: Copy>(begin: T, steps_m: &[f64], around: impl Fn(T, f64) -> Vec<T>, score: impl Fn(&T) -> f64) -> T {
+    let mut best = begin;
+    for step_m in steps_m {
+        loop {
+            match around(best, *step_m).into_iter().max_by(|a, b| score(a).total_cmp(&score(b))) {
+                Some(next) if score(&next) > score(&best) => best = next,
+                _ => break,
             }
         }
-        (most, place)
-    };
-    best_apart(places.into_iter().map(move_to_best).collect(), same, usize::MAX)
+    }
+    best
 }
 
 fn witness(rows: &[Happened], outlines: Outlines) -> Witness {
@@ -325,15 +333,16 @@ mod tests {
     #[test]
     fn pushes_that_are_stopped_tell_where_and_those_that_pass_where_not() {
         let body = ([0.02, -0.01], 0.025);
+        let seen = |witnesses| Seen { witnesses, outlines: OUTLINES };
         let pushes = [0.0, 1.1, 2.5, 4.0].map(|yaw| witness(&push(yaw, body.0, Some(body)), OUTLINES));
-        let (place, radius_m) = most_voted(&pushes, OUTLINES, 3)[0];
-        assert!(distance(place, body.0) < 0.003 && (radius_m - body.1).abs() < 0.003, "{place:?} {radius_m}");
         assert!(pushes.iter().all(|push| push.vote(body.0, body.1, OUTLINES) > 0.8));
+        let (place, radius_m) = seen(pushes.into()).places(3)[0];
+        assert!(distance(place, body.0) < 0.003 && (radius_m - body.1).abs() < 0.003, "{place:?} {radius_m}");
         let passing = witness(&push(0.5, body.0, None), OUTLINES);
         assert!(passing.event.is_none());
         assert_eq!(passing.vote(body.0, body.1, OUTLINES), -PASSED);
         assert_eq!(passing.vote([0.3, 0.3], body.1, OUTLINES), 0.0);
-        assert!(most_voted(&[passing], OUTLINES, 3).is_empty());
+        assert!(seen(vec![passing]).places(3).is_empty());
     }
 
     #[test]

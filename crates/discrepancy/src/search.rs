@@ -129,8 +129,7 @@ impl Search<'_> {
     pub(crate) fn asked(&self, explained: f64) -> Asked {
         let rolls = self.study.simulator.nominal.rolls();
         let threshold = if rolls { self.settings.threshold_rolling } else { self.settings.threshold };
-        // The errors of a solver grow with what it is asked to explain.
-        // Of what lacks more than two effects the first links of a chain are the strong ones.
+        // The errors of a solver grow with what it is asked to explain; links of a chain are asked more (see there).
         let shares = if self.settings.effects > 2 { [LEAST_SHARE; 2] } else { [LEAST_SECOND_SHARE, SECOND_SHARE] };
         let [least, plain] = shares.map(|share| threshold.max(share * explained));
         Asked { least, plain, kept: rolls, steady: rolls }

@@ -3,7 +3,7 @@
 
 use physics_model::effect::EffectConfig;
 
-use super::{Place, RANGE_M, Seen};
+use super::{Place, RANGE_M, Seen, circles, climb};
 use crate::candidate::bodies;
 use crate::fit::Fit;
 use crate::likelihood::{Stack, explained, mean_square};
@@ -93,31 +93,21 @@ fn sort(found: &mut [Tried]) {
 
 /// Moves and grows a body by smaller and smaller steps as long as it explains more.
 fn descend(begin: Tried, tried: impl Fn(Place, usize, f64) -> Option<Tried>) -> Tried {
-    let mut best = begin;
-    for step_m in STEPS_M {
-        loop {
-            let ([x, y], radius_m) = best.place;
-            let steps = [[step_m, 0.0, 0.0], [0.0, step_m, 0.0], [0.0, 0.0, step_m]].into_iter();
-            let around = steps.flat_map(|[dx, dy, dr]| {
-                [1.0, -1.0].map(|sign| ([x + sign * dx, y + sign * dy], radius_m + sign * dr))
-            });
-            let within = around.filter(|place| (RANGE_M[0]..=RANGE_M[1]).contains(&place.1));
-            let moved = within.filter_map(|place| tried(place, best.body, best.gain));
-            match moved.max_by(|a, b| a.gain.total_cmp(&b.gain)) {
-                Some(most) if most.gain > best.gain => best = most,
-                _ => break,
-            }
-        }
-    }
-    best
+    let around = |best: Tried, step_m: f64| {
+        let ([x, y], radius_m) = best.place;
+        let steps = [[step_m, 0.0, 0.0], [0.0, step_m, 0.0], [0.0, 0.0, step_m]].into_iter();
+        let around = steps
+            .flat_map(|[dx, dy, dr]| [1.0, -1.0].map(|sign| ([x + sign * dx, y + sign * dy], radius_m + sign * dr)));
+        let within = around.filter(|place| (RANGE_M[0]..=RANGE_M[1]).contains(&place.1));
+        within.filter_map(|place| tried(place, best.body, best.gain)).collect()
+    };
+    climb(begin, &STEPS_M, around, |tried| tried.gain)
 }
 
 /// Of a grid around a place those with most votes.
-fn promising(seen: &Seen, (place, radius_m): Place) -> Vec<Place> {
-    let grid = (0..125).map(|code| [code % 5, code / 5 % 5, code / 25].map(|n| SPACING_M * (f64::from(n) - 2.0)));
-    let moved = grid.map(|[x, y, grown_m]| ([place[0] + x, place[1] + y], radius_m + grown_m));
-    let within = moved.filter(|place| (RANGE_M[0]..=RANGE_M[1]).contains(&place.1));
-    let mut voted: Vec<(f64, Place)> = within.map(|place| (seen.votes(&place), place)).collect();
+fn promising(seen: &Seen, place: Place) -> Vec<Place> {
+    let circles = circles(place, SPACING_M, 2, RANGE_M);
+    let mut voted: Vec<(f64, Place)> = circles.map(|place| (seen.votes(&place), place)).collect();
     voted.sort_by(|a, b| b.0.total_cmp(&a.0));
     voted.into_iter().take(SIMULATED).map(|(_, place)| place).collect()
 }
