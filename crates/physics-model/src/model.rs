@@ -160,6 +160,20 @@ impl PushModel {
         (body.position_m, body.orientation)
     }
 
+    /// Moves the object of a hypothesis that stands where the effects of the list have put a reading to where its own values of theirs put it, on the table as
+    /// before: of an unknown offset each hypothesis has its own place behind one reading.
+    pub fn displace(&self, particle: &mut Particle) {
+        let Some(own) = self.own_effects(&particle.theta) else { return };
+        if !Hooks::of(&own).contains(Hooks::POSE) {
+            return;
+        }
+        let object = &mut particle.state.object;
+        let height_m = object.position_m[2];
+        let body = signal::unread(&own, &signal::read(&self.effects, object));
+        object.position_m = [body.position_m[0], body.position_m[1], height_m];
+        object.orientation = body.orientation;
+    }
+
     /// What a hypothesis that joins the belief after an action remembers, by one that was in it before: the time. `None` where no effect
     /// needs it.
     #[must_use]

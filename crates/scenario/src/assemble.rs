@@ -28,6 +28,9 @@ pub struct Problem {
     pub start_joints_rad: Vec<f64>,
 }
 
+/// Draws of a hypothesis, at most, until its own effects have not put the object into something.
+const DISPLACED: usize = 100;
+
 impl Problem {
     /// Loads the arm and puts the parts together.
     ///
@@ -97,9 +100,13 @@ impl Problem {
         let [x, y, z, w] = orientation;
         let yaw = (2.0 * (w * z + x * y)).atan2(1.0 - 2.0 * (y * y + z * z));
         pinned.object.yaw_rad = pin(yaw, noise.orientation_rad);
-        (0..count)
-            .map(|_| pinned.sample_possible(&self.model, &self.start_joints_rad, rng).ok_or_else(|| self.impossible()))
-            .collect()
+        let mut one = || {
+            let mut particle = pinned.sample_possible(&self.model, &self.start_joints_rad, rng)?;
+            self.model.displace(&mut particle);
+            Some(particle)
+        };
+        let mut possible = || (0..DISPLACED).find_map(|_| one().filter(|particle| self.model.check(particle).is_ok()));
+        (0..count).map(|_| possible().ok_or_else(|| self.impossible())).collect()
     }
 
     fn impossible(&self) -> Error {
