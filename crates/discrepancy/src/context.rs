@@ -1,7 +1,8 @@
 //! What is known of a log before any effect is tried.
 
 use measured_log::Log;
-use physics_model::{ObjectShape, ObjectTheta};
+use physics_model::effect;
+use physics_model::{EffectConfig, ObjectShape, ObjectTheta};
 use rayon::prelude::*;
 
 use crate::candidate::Context;
@@ -29,6 +30,12 @@ pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels)
     let nominal = study.simulator.nominal;
     let engine = nominal.engine();
     let (world, theta) = nominal.rig(&null.x, &engine).nominal(&nominal.object(&null.x, 0.0, &engine));
+    // A friction that a model file has is what another one would take the place of.
+    let effects: Vec<_> = nominal.effects.iter().map(EffectConfig::build).collect();
+    let (world, theta) = match effect::Nominal::with_effects(&world, &theta, &effects) {
+        Some(with) => (with.world, with.theta),
+        None => (world, theta),
+    };
     let has = |kind: Kind| noise.of(kind).is_some();
     let mut path: Vec<[f64; 2]> = Vec::new();
     let mut largest_force_n = 0.0_f64;

@@ -7,6 +7,7 @@ use measured_log::Log;
 use crate::accept::Episodes;
 use crate::candidate::candidates;
 use crate::context::context;
+use crate::driven::driven;
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::fit::{Begin, Effort, Fit, fit};
@@ -161,7 +162,11 @@ pub struct Diagnosis {
     pub evidence: Evidence,
     /// Simulated episodes.
     pub rollouts: usize,
-    /// Places of the pieces of each fitted episode.
+    /// Episodes that cannot be simulated: without a pose of the object, or without a row after it.
+    pub left_out: Vec<u64>,
+    /// Numbers of the fitted episodes in the log.
+    pub fitted_ids: Vec<u64>,
+    /// Places of the pieces of each of them.
     pub pieces: Vec<Range<usize>>,
 }
 
@@ -169,10 +174,11 @@ pub struct Diagnosis {
 ///
 /// # Errors
 ///
-/// [`Error::Unfit`] for a log without poses of the object, or with too few episodes that can be simulated.
+/// [`Error::Unfit`] for a log without poses of the object, with too few episodes that can be simulated, or of an arm that nothing says the way of.
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
+    let log = &*driven(log, name, nominal)?;
     let noise = NoiseLevels::of_log(log);
-    let (trials, [fitted, heldout]) = trials(log, name, nominal, &noise, settings)?;
+    let (trials, [fitted, heldout], left_out) = trials(log, name, nominal, &noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
     let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]);
@@ -234,6 +240,8 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         tunables: nominal.tunables.clone(),
         lacking_force: None,
         rollouts: 0,
+        left_out,
+        fitted_ids: episodes.fitted.iter().map(|group| trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };
     if verdict(&diagnosis, settings) == Verdict::Unknown {
@@ -250,30 +258,33 @@ fn trials(
     nominal: &Nominal,
     noise: &NoiseLevels,
     settings: &Settings,
-) -> Result<(Vec<Trial>, [Vec<usize>; 2]), Error> {
+) -> Result<(Vec<Trial>, [Vec<usize>; 2], Vec<u64>), Error> {
     let split = match settings.fold {
         Some([part, parts]) => log.fold(settings.seed, part, parts),
         None => log.split(settings.seed),
     };
     let mut trials = Vec::new();
     let mut sides = [Vec::new(), Vec::new()];
+    let mut left_out = Vec::new();
     for (index, episode) in log.episodes.iter().enumerate() {
         let side = &mut sides[usize::from(split.holdout.contains(&index))];
-        for trial in Trial::of_episode(log, episode, noise, nominal.has_tool()) {
-            side.push(trials.len());
-            trials.push(trial);
+        let pieces = Trial::of_episode(log, episode, noise, nominal.has_tool());
+        if pieces.is_empty() {
+            left_out.push(episode.id);
         }
+        side.extend(trials.len()..trials.len() + pieces.len());
+        trials.extend(pieces);
     }
     let episodes = |side: &[usize]| groups(side.iter().map(|index| &trials[*index])).len();
     let [fitted, heldout] = [episodes(&sides[0]), episodes(&sides[1])];
     if fitted < LEAST_FITTED || heldout == 0 {
         let reason = format!(
-            "expected at least {LEAST_FITTED} episodes to fit and one held out, each with two rows and a pose of the object in the first, \
+            "expected at least {LEAST_FITTED} episodes to fit and one held out, each with a pose of the object and a row after it, \
              found {fitted} and {heldout}"
         );
         return Err(Error::Unfit { log: name.into(), reason });
     }
-    Ok((trials, sides))
+    Ok((trials, sides, left_out))
 }
 
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.

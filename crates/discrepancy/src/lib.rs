@@ -38,6 +38,7 @@ pub mod candidate;
 mod chain;
 mod context;
 pub mod diagnosis;
+mod driven;
 mod error;
 pub mod evidence;
 pub mod fit;

@@ -65,13 +65,13 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     // Before a minute is spent on what could not be written.
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.measured));
     whole_file::check_owner(&out, "report.json").map_err(|source| Error::Taken { source })?;
-    let made = !out.exists();
+    let made: Vec<PathBuf> = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
     std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
     let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
     let name = arguments.measured.display().to_string();
     let diagnosis = diagnose(&log, &name, &nominal, &settings).inspect_err(|_| {
         // A log that says too little leaves nothing behind.
-        let _ = made.then(|| std::fs::remove_dir(&out));
+        made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
     })?;
     let report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
     let json =
@@ -128,6 +128,10 @@ fn print_summary(report: &Report, out: &Path) {
     for cell in report.located.iter().take(3).filter(|cell| cell.share > 0.0) {
         let (channel, phase) = (cell.channel.name(), cell.phase.name());
         whole_file::out!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
+    }
+    if !report.left_out.is_empty() {
+        let ids: Vec<String> = report.left_out.iter().map(u64::to_string).collect();
+        whole_file::out!("  left out, without a pose of the object and a row after it: episodes {}", ids.join(", "));
     }
     whole_file::out!("  next: {}", report.next_experiment);
     whole_file::out!(

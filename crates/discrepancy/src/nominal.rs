@@ -171,6 +171,12 @@ impl Nominal {
         &self.header
     }
 
+    /// What moves by command.
+    #[must_use]
+    pub fn tool(&self) -> &RigTool {
+        &self.tool
+    }
+
     /// Whether something moves by command.
     #[must_use]
     pub fn has_tool(&self) -> bool {

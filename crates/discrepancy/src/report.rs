@@ -32,7 +32,8 @@ pub struct NamedEffect {
     pub name: &'static str,
     /// What it does, in a line.
     pub description: &'static str,
-    /// Probability among the fitted rivals and the nominal model, of tempered evidences ([`Settings::temperature`]).
+    /// Probability among the fitted rivals and the nominal model, of tempered evidences ([`Settings::temperature`]); of a further effect over nothing by more than
+    /// what errors of the engine make beside those before it. At most one half where the verdict is `unknown`.
     pub confidence: f64,
     /// Gain in ln evidence over the model without it; of one of several of what is thrown what the episodes of the screening say for all.
     pub log_evidence: f64,
@@ -132,6 +133,8 @@ pub struct Report {
     pub seed: u64,
     /// Part of how many that was held out, counted from 1, as on the command line; `None`: the share that the log says.
     pub fold: Option<[usize; 2]>,
+    /// Episodes of the log that cannot be simulated: without a pose of the object, or without a row after it.
+    pub left_out: Vec<u64>,
     /// Simulated episodes.
     pub rollouts: usize,
     /// Duration, s.
@@ -143,6 +146,13 @@ const CLOSED: f64 = 0.95;
 
 /// The same where what is left is small.
 const NEARLY_CLOSED: f64 = 0.9;
+
+/// Confidence, at most, in what does not explain the gap: something else is at least as likely.
+const NO_LIKELIER: f64 = 0.5;
+
+/// What a further effect gains, as a share of what those before it did, that errors of the engine make of nothing: ln evidence of it over nothing is divided by this.
+/// Of seeds 17 to 20 of the benchmark ten further names of single effects that were wrong gained 0.6 to 13 %, 57 right ones of pairs 1.5 % and more, 17 of them less than 10 %.
+const SECOND_ERROR: f64 = 0.03;
 
 /// An effect that closes less than this of a gap stands for something else.
 const HALF: f64 = 0.5;
@@ -160,8 +170,11 @@ impl Report {
         let [before, after] = heldout_errors(diagnosis);
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
         widen(&mut samples, &diagnosis.model);
-        let effects = effects(diagnosis, &samples, settings);
+        let mut effects = effects(diagnosis, &samples, settings);
         let verdict = verdict(diagnosis, settings);
+        if verdict == Verdict::Unknown {
+            effects.iter_mut().for_each(|effect| effect.confidence = effect.confidence.min(NO_LIKELIER));
+        }
         let confusion_set = confusion_set(diagnosis, settings, &effects);
         let summary = summary(verdict, &effects, before, after);
         let description =
@@ -170,7 +183,12 @@ impl Report {
             version: 1,
             verdict,
             summary,
-            next_experiment: separate::next_experiment(verdict, !effects.is_empty(), &confusion_set),
+            next_experiment: separate::next_experiment(
+                verdict,
+                !effects.is_empty(),
+                &confusion_set,
+                separate::telling(diagnosis, &confusion_set),
+            ),
             confusion_set,
             ranking: ranking(diagnosis, count),
             located: diagnosis.located.clone(),
@@ -190,6 +208,7 @@ impl Report {
             evidence: diagnosis.evidence.clone(),
             seed: settings.seed,
             fold: settings.fold.map(|[part, parts]| [part + 1, parts]),
+            left_out: diagnosis.left_out.clone(),
             rollouts: diagnosis.rollouts,
             seconds,
         }
@@ -269,11 +288,14 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> 
     let model = &diagnosis.model.model;
     let fitted = model.hypothesis(&diagnosis.model.x).effects;
     let resampled: Vec<_> = samples.iter().map(|x| model.hypothesis(x).effects).collect();
+    let mut explained = 0.0;
     (model.parts.iter().enumerate())
         .map(|(place, part)| {
             let kind = part.kind();
             let round = &diagnosis.rounds[place];
             let gain = round.rivals[0].gain;
+            let noise = settings.temperature.max(SECOND_ERROR * explained);
+            explained += gain;
             let passed = round.passed_over(&diagnosis.heldout_counts);
             let passed = passed.iter().map(|(_, more)| gain + more);
             let others = round.rivals.iter().skip(1).map(|rival| rival.gain).chain(passed);
@@ -293,7 +315,7 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> 
             NamedEffect {
                 name: kind.name(),
                 description: kind.description(),
-                confidence: confidence(gain, others, settings.temperature),
+                confidence: confidence(gain, others, settings.temperature, noise),
                 log_evidence: gain,
                 parameters,
             }
@@ -301,10 +323,11 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> 
         .collect()
 }
 
-/// Probability of what gains so much among its rivals, of these gains, and nothing; equal prior odds, ln evidences divided by the temperature.
-fn confidence(gain: f64, others: impl Iterator<Item = f64>, temperature: f64) -> f64 {
+/// Probability of what gains so much among its rivals, of these gains, and nothing; equal prior odds, ln evidences divided by the temperature, those over
+/// nothing by `noise`.
+fn confidence(gain: f64, others: impl Iterator<Item = f64>, temperature: f64, noise: f64) -> f64 {
     let odds = |other: f64| ((other - gain) / temperature).exp();
-    1.0 / (1.0 + others.map(odds).sum::<f64>() + odds(0.0))
+    1.0 / (1.0 + others.map(odds).sum::<f64>() + (-gain / noise).exp())
 }
 
 /// A key without the unit at its end.
@@ -440,9 +463,11 @@ mod tests {
     fn confidence_is_a_tempered_probability() {
         // Alone with nothing, 10 ahead: odds of e² to 1; a rival beside it as good halves it.
         let two = 2.0_f64.exp();
-        assert!((confidence(10.0, [].into_iter(), 5.0) - two / (two + 1.0)).abs() < 1e-12);
-        assert!((confidence(1e4, [1e4].into_iter(), 5.0) - 0.5).abs() < 1e-12);
-        assert!((confidence(1e4, [1e4 - 5.0 * 3.0_f64.ln()].into_iter(), 5.0) - 0.75).abs() < 1e-9);
+        assert!((confidence(10.0, [].into_iter(), 5.0, 5.0) - two / (two + 1.0)).abs() < 1e-12);
+        assert!((confidence(1e4, [1e4].into_iter(), 5.0, 5.0) - 0.5).abs() < 1e-12);
+        assert!((confidence(1e4, [1e4 - 5.0 * 3.0_f64.ln()].into_iter(), 5.0, 5.0) - 0.75).abs() < 1e-9);
+        // Beside something that gained 10 000 a gain of 200 may be an error of the engine.
+        assert!((confidence(200.0, [].into_iter(), 5.0, 300.0) - 0.66).abs() < 0.01);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! What to record next: the experiment that tells confusable effects apart.
 
+use crate::diagnosis::Diagnosis;
+use crate::likelihood::episode_cost;
 use crate::report::Verdict;
 
 /// Pairs that logs confuse, and what separates them (catalogue).
@@ -67,16 +69,65 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "weigh the object before and after, or read the force without contact: only a drift shows there",
     ),
     ("viscous_damping", "friction_level", "push at two speeds: friction does not grow with speed"),
+    (
+        "wrist_payload",
+        "force_gain",
+        "move freely in several directions: a payload is felt there, a gain has nothing to scale",
+    ),
+    (
+        "joint_friction",
+        "wrist_payload",
+        "move freely back and forth at constant speed: friction changes its sign, weight does not",
+    ),
+    ("backlash", "actuation_delay", "reverse at two speeds: play takes the same way, a delay the same time"),
+    (
+        "rolling_resistance",
+        "viscous_damping",
+        "let it roll with and without a known weight: only rolling resistance scales",
+    ),
+    ("hidden_obstacle", "friction_patch", "cross the place from all sides: a body stops the object, a patch slows it"),
+    (
+        "time_base",
+        "force_low_pass",
+        "move freely along commands that change: a slow force sensor leaves poses where they are",
+    ),
 ];
 
-/// What to do next; `named`: whether something was, or the confusion set is but what the evidence leans to.
+/// Of the episodes of a log the one that says most of which of two names it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Telling {
+    /// Number of the episode in the log.
+    pub episode: u64,
+    /// What it adds to the ln odds of the first name.
+    pub ln_odds: f64,
+}
+
+/// Which episode tells the first two of a confusion set apart, where both were fitted to all.
+pub(crate) fn telling(diagnosis: &Diagnosis, confusion_set: &[&str]) -> Option<Telling> {
+    let [first, second, ..] = confusion_set else { return None };
+    let round = diagnosis.rounds.first()?;
+    let costs = |name: &str| -> Option<Vec<f64>> {
+        let rival = round.rivals.iter().find(|rival| rival.whole && rival.kind().name() == name)?;
+        let of = |place: usize| rival.fit.residuals.get(place).map(|r| episode_cost(r.norm_squared(), r.len()));
+        (diagnosis.pieces.iter()).map(|group| group.clone().map(of).sum::<Option<f64>>()).collect()
+    };
+    let (first, second) = (costs(first)?, costs(second)?);
+    let odds = first.iter().zip(&second).map(|(first, second)| second - first).zip(&diagnosis.fitted_ids);
+    odds.map(|(ln_odds, id)| Telling { episode: *id, ln_odds })
+        .max_by(|a, b| a.ln_odds.abs().total_cmp(&b.ln_odds.abs()))
+}
+
+/// What to do next; `named`: whether something was, or the confusion set is but what the evidence leans to. `telling`: what tells the first two apart.
 #[must_use]
-pub fn next_experiment(verdict: Verdict, named: bool, confusion_set: &[&str]) -> String {
+pub fn next_experiment(verdict: Verdict, named: bool, confusion_set: &[&str], telling: Option<Telling>) -> String {
     let first = confusion_set.first().filter(|_| named);
+    let like = telling.map_or(String::new(), |Telling { episode, ln_odds }| {
+        format!(" Of this log episode {episode} says most of it ({ln_odds:+.1} of ln odds): more like that one.")
+    });
     for other in confusion_set.iter().skip(1) {
         let pair = PAIRS.iter().find(|(a, b, _)| first == Some(a) && other == b || first == Some(b) && other == a);
         if let Some((a, b, how)) = pair {
-            return format!("{a} or {b}: {how}.");
+            return format!("{a} or {b}: {how}.{like}");
         }
     }
     const DESIGNED: &str = "a designed set (eight directions, four speeds, known added weights)";
@@ -90,7 +141,7 @@ pub fn next_experiment(verdict: Verdict, named: bool, confusion_set: &[&str]) ->
                 .into()
         }
         (Verdict::Effect, [_]) => "None needed to name it; more episodes narrow the intervals.".into(),
-        (Verdict::Effect, names) => format!("{}: {DESIGNED}.", names.join(" or ")),
+        (Verdict::Effect, names) => format!("{}: {DESIGNED}.{like}", names.join(" or ")),
     }
 }
 
@@ -101,10 +152,12 @@ mod tests {
     #[test]
     fn a_pair_is_told_apart_only_if_one_of_it_is_named() {
         let pair = ["mass_leak", "force_drift"];
-        assert!(next_experiment(Verdict::Effect, true, &pair).starts_with("mass_leak or force_drift: weigh"));
-        assert!(next_experiment(Verdict::Unknown, true, &pair).contains("weigh"));
-        assert!(next_experiment(Verdict::Unknown, false, &pair).starts_with("Repeat"));
-        assert!(next_experiment(Verdict::None, false, &pair).ends_with("a weak mass_leak or force_drift."));
-        assert!(next_experiment(Verdict::None, false, &[]).ends_with("smaller effects."));
+        assert!(next_experiment(Verdict::Effect, true, &pair, None).starts_with("mass_leak or force_drift: weigh"));
+        assert!(next_experiment(Verdict::Unknown, true, &pair, None).contains("weigh"));
+        let telling = Some(Telling { episode: 7, ln_odds: 2.34 });
+        assert!(next_experiment(Verdict::Effect, true, &pair, telling).contains("episode 7 says most of it (+2.3 of"));
+        assert!(next_experiment(Verdict::Unknown, false, &pair, None).starts_with("Repeat"));
+        assert!(next_experiment(Verdict::None, false, &pair, None).ends_with("a weak mass_leak or force_drift."));
+        assert!(next_experiment(Verdict::None, false, &[], None).ends_with("smaller effects."));
     }
 }

@@ -10,7 +10,7 @@ use physics_model::{BodyState, EffectConfig, EffectKind};
 use rayon::prelude::*;
 
 use crate::nominal::{Engine, Nominal};
-use crate::trial::{Trial, groups};
+use crate::trial::{Trial, WHOLE};
 
 /// A bounce is over within a step of a slow push: it needs this many times as many.
 const BOUNCE_REFINEMENT: u32 = 3;
@@ -46,7 +46,7 @@ pub struct Simulator<'a> {
     pub nominal: &'a Nominal,
     /// The episodes.
     pub trials: &'a [Trial],
-    ticks: AtomicUsize,
+    simulated: AtomicUsize,
     /// Simulated episodes after which fits end where they are, and which none of their simulations exceeds.
     budget: [usize; 2],
 }
@@ -55,7 +55,7 @@ impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, ticks: AtomicUsize::new(0), budget: [usize::MAX; 2] }
+        Self { nominal, trials, simulated: AtomicUsize::new(0), budget: [usize::MAX; 2] }
     }
 
     /// With a number of simulated episodes after which fits end where they are, and one that they never exceed.
@@ -76,21 +76,16 @@ impl<'a> Simulator<'a> {
         self.rollouts() + count <= self.budget[1]
     }
 
-    /// Simulated time so far, in mean durations of an episode.
+    /// Episodes simulated so far; pieces of one count in proportion to their durations.
     #[must_use]
     pub fn rollouts(&self) -> usize {
-        self.in_episodes(self.ticks.load(Ordering::Relaxed))
+        self.simulated.load(Ordering::Relaxed).div_ceil(WHOLE)
     }
 
     /// What a simulation of the episodes `chosen` costs of these.
     #[must_use]
     pub fn cost(&self, chosen: &[usize]) -> usize {
-        self.in_episodes(chosen.iter().map(|index| self.trials[*index].ticks).sum()) + 1
-    }
-
-    fn in_episodes(&self, ticks: usize) -> usize {
-        let all: usize = self.trials.iter().map(|trial| trial.ticks).sum();
-        ticks * groups(self.trials.iter()).len() / all.max(1)
+        chosen.iter().map(|index| self.trials[*index].share).sum::<usize>().div_ceil(WHOLE)
     }
 
     /// Residuals of the episodes `chosen` (see [`Trial::residuals`]), in parallel; the order is that of `chosen`.
@@ -108,7 +103,7 @@ impl<'a> Simulator<'a> {
         nudge: Nudge,
         trial: &Trial,
     ) -> (RigReading, Vec<RigReading>) {
-        self.ticks.fetch_add(trial.ticks, Ordering::Relaxed);
+        self.simulated.fetch_add(trial.share, Ordering::Relaxed);
         let configs = || self.nominal.effects.iter().chain(&hypothesis.effects);
         let bounces = configs().any(|effect| effect.kind() == EffectKind::Restitution) && self.nominal.has_tool();
         let engine = &Engine { refinement: engine.refinement * if bounces { BOUNCE_REFINEMENT } else { 1 }, ..*engine };
@@ -116,7 +111,7 @@ impl<'a> Simulator<'a> {
         let object = self.nominal.object(&hypothesis.z, trial.added_mass_kg, engine);
         let effects: Vec<Box<dyn Effect>> = configs().map(EffectConfig::build).collect();
         let body = nudged(&trial.start, &trial.start_stddev, nudge);
-        let start = RigStart::of_episode(body, trial.tool_m);
+        let start = RigStart { joints_rad: trial.joints_rad, ..RigStart::of_episode(body, trial.tool_m) };
         // What went wrong on the way is as far from what was measured as the rest of the episode is.
         let mut readings =
             rig.run(&object, &effects, &start, &trial.commands).unwrap_or_else(|error| error.readings().to_vec());

@@ -18,6 +18,7 @@ use std::ops::Range;
 use measured_log::{Axis, Channel, Component, Episode, Log};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics_model::rig::RigReading;
+use physics_model::robot::JointVector;
 use physics_model::state::BodyState;
 
 use crate::noise::NoiseLevels;
@@ -79,6 +80,21 @@ pub(crate) fn groups<'a>(trials: impl Iterator<Item = &'a Trial>) -> Vec<Range<u
     groups.into_iter().map(|(_, range)| range).collect()
 }
 
+/// What an episode counts, of which its pieces have their shares.
+pub(crate) const WHOLE: usize = 1_000_000;
+
+/// The pieces of an episode with their shares of it, which come to a whole.
+fn shared(mut pieces: Vec<Trial>) -> Vec<Trial> {
+    let whole: usize = pieces.iter().map(|piece| piece.ticks).sum();
+    let mut ticks = 0;
+    for piece in &mut pieces {
+        let before = ticks * WHOLE / whole;
+        ticks += piece.ticks;
+        piece.share = ticks * WHOLE / whole - before;
+    }
+    pieces
+}
+
 /// A block of rows of one component.
 #[derive(Clone, Debug)]
 pub struct Block {
@@ -99,6 +115,8 @@ pub struct Trial {
     pub id: u64,
     /// Simulated ticks after the start.
     pub ticks: usize,
+    /// Of simulating its episode, in millionths: what of it is in this piece.
+    pub(crate) share: usize,
     /// Command at the end of each tick; of the free body only the number counts.
     pub commands: Vec<[f64; 3]>,
     /// Known weight, kg.
@@ -109,6 +127,8 @@ pub struct Trial {
     pub start_stddev: [f64; 4],
     /// The tool where it begins, m.
     pub tool_m: Option<[f64; 3]>,
+    /// The posture it begins in, rad, where it is known.
+    pub joints_rad: Option<JointVector>,
     /// Of each row: tick and share of the way to the next.
     rows: Vec<(usize, f64)>,
     scalars: Vec<Scalar>,
@@ -129,17 +149,17 @@ struct Scalar {
 }
 
 impl Trial {
-    /// What an episode of a log is compared by: the whole with a tool, pieces of what a free body does. Nothing where it has no second row or no
-    /// pose of the object.
+    /// What an episode of a log is compared by: the whole from its first pose of the object on with a tool, pieces of what a free body does. Nothing where it
+    /// has no pose, or no row after it.
     #[must_use]
     pub fn of_episode(log: &Log, episode: &Episode, noise: &NoiseLevels, has_tool: bool) -> Vec<Self> {
         let pieces = if has_tool { Vec::new() } else { shots::shots(log, episode, noise) };
         if pieces.is_empty() {
-            let start = start::start(episode, noise);
-            start.and_then(|start| Self::begun(log, episode, noise, has_tool, start)).into_iter().collect()
-        } else {
-            pieces
+            let Some(episode) = start::from_first_pose(episode) else { return Vec::new() };
+            let start = start::start(&episode, noise);
+            return start.and_then(|start| Self::begun(log, &episode, noise, has_tool, start)).into_iter().collect();
         }
+        shared(pieces)
     }
 
     /// With the given start and its standard deviations.
@@ -189,11 +209,13 @@ impl Trial {
         let mut trial = Self {
             id: episode.id,
             ticks,
+            share: WHOLE,
             commands: commands.unwrap_or_else(|| vec![[0.0; 3]; ticks]),
             added_mass_kg,
             start,
             start_stddev,
             tool_m: tool_m.flatten(),
+            joints_rad: start::posture(episode, log.header.robot.joints()),
             rows,
             scalars,
             orientation,

@@ -51,6 +51,28 @@ fn a_tilted_table_is_named_with_its_slope_and_a_second_pass_finds_nothing() {
 }
 
 #[test]
+fn every_other_recorded_log_gets_the_right_answer() {
+    for set in ["set-000", "set-001", "set-004", "set-005", "set-007", "set-008", "set-011"] {
+        let text = std::fs::read_to_string(logs().join("../truth").join(set).with_extension("json")).unwrap();
+        let truth: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let (found, _) = report(set, None);
+        let names: Vec<&str> = found.effects.iter().map(|effect| effect.name).collect();
+        match truth["effect"].as_str().unwrap() {
+            "none" => assert_eq!(found.verdict, Verdict::None, "{set}: {}", found.summary),
+            hidden => {
+                assert_eq!(
+                    (found.verdict, names.as_slice()),
+                    (Verdict::Effect, [hidden].as_slice()),
+                    "{set}: {}",
+                    found.summary
+                );
+                assert!(found.confusion_set.contains(&hidden), "{set}: {:?}", found.confusion_set);
+            }
+        }
+    }
+}
+
+#[test]
 fn where_nothing_is_hidden_nothing_is_named() {
     let (found, model) = report("set-002", None);
     assert_eq!(found.verdict, Verdict::None, "{}", found.summary);

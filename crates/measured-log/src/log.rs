@@ -1,6 +1,7 @@
 //! A log: header and episodes, and what makes one valid.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::error::Problem;
 use crate::header::{Header, Robot};
@@ -46,6 +47,21 @@ impl Episode {
     pub fn vector(&self, channel: fn(Axis) -> Channel, row: usize) -> Option<[f64; 3]> {
         let [x, y, z] = Axis::ALL.map(|axis| self.get(channel(axis), row));
         Some([x?, y?, z?])
+    }
+
+    /// Some rows of it.
+    ///
+    /// # Panics
+    ///
+    /// If it has not so many.
+    #[must_use]
+    pub fn part(&self, rows: Range<usize>) -> Self {
+        Self {
+            id: self.id,
+            time_secs: self.time_secs[rows.clone()].to_vec(),
+            action: self.action.as_ref().map(|action| action[rows.clone()].to_vec()),
+            channels: self.channels.iter().map(|(channel, cells)| (*channel, cells.slice(rows.clone()))).collect(),
+        }
     }
 
     /// Orientation of the object in a row as quaternion x, y, z, w, body to base, as measured: its norm is 1 within [`UNIT_TOLERANCE`].

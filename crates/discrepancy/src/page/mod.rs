@@ -88,7 +88,7 @@ fn foot(report: &Report) -> String {
         ("mean square", "Of white residuals; 1 is noise alone, 4 is an error twice as large as the noise."),
         (
             "held-out",
-            "Episodes that nothing was fitted to; before: nominal model re-tuned; after: with the named effects.",
+            "Episodes that no value was fitted to (where a body or a patch may be, and which name is kept, they have a say in); before: nominal model re-tuned; after: with the named effects.",
         ),
         ("ln evidence", "How much more probable the log is under a model, its free values integrated over."),
         ("confidence", confidence.as_str()),
@@ -101,8 +101,14 @@ fn foot(report: &Report) -> String {
     ];
     let lines: String = lines.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{text}</dd>")).collect();
     let fold = report.fold.map(|[part, parts]| format!(", part {part} of {parts} held out")).unwrap_or_default();
+    let left_out: Vec<String> = report.left_out.iter().map(u64::to_string).collect();
+    let left_out = if left_out.is_empty() {
+        String::new()
+    } else {
+        format!(" Left out, without a pose of the object and a row after it: episodes {}.", left_out.join(", "))
+    };
     format!(
-        "<dl>{lines}</dl><p class=\"soft\">Seed {}{fold}; {} simulated episodes, {} s. Version {} of the contract of report.json.</p>",
+        "<dl>{lines}</dl><p class=\"soft\">Seed {}{fold}; {} simulated episodes, {} s. Version {} of the contract of report.json.{left_out}</p>",
         report.seed,
         report.rollouts,
         fixed(report.seconds, 1),

@@ -103,6 +103,7 @@ fn report(verdict: Verdict) -> Report {
         next_experiment: "Push in eight directions.".into(),
         seed: 1,
         fold: None,
+        left_out: Vec::new(),
         rollouts: 3600,
         seconds: 41.0,
     }

@@ -39,18 +39,7 @@ pub(super) fn shots(log: &Log, episode: &Episode, noise: &NoiseLevels) -> Vec<Tr
 
 /// Some rows of an episode, without the velocities that a sensor derived from them.
 fn piece(episode: &Episode, first: usize, end: usize) -> Episode {
-    let derived = |channel: &Channel| matches!(channel, Channel::ObjectVelocity(_) | Channel::ObjectSpin(_));
-    Episode {
-        id: episode.id,
-        time_secs: episode.time_secs[first..end].to_vec(),
-        action: None,
-        channels: (episode.channels.iter())
-            .filter(|(channel, _)| !derived(channel))
-            .map(|(channel, readings)| {
-                let mut rows = measured_log::Readings::default();
-                readings.iter().skip(first).take(end - first).for_each(|reading| rows.push(reading));
-                (*channel, rows)
-            })
-            .collect(),
-    }
+    let mut piece = episode.part(first..end);
+    piece.channels.retain(|channel, _| !matches!(channel, Channel::ObjectVelocity(_) | Channel::ObjectSpin(_)));
+    piece
 }

@@ -1,20 +1,52 @@
 //! What an episode starts from and is driven by.
 
+use std::borrow::Cow;
+
 use measured_log::{Axis, Channel, Episode};
 use nalgebra::{UnitQuaternion, Vector3};
 use physics_model::BodyState;
+use physics_model::robot::JointVector;
 
 use super::{Kind, rotation};
 use crate::noise::NoiseLevels;
 
 /// Most rows at rest that the start is averaged over.
 const REST_ROWS: usize = 50;
+/// Rows at rest that a posture is averaged over, at least.
+const LEAST_REST_ROWS: usize = 10;
 /// How far, in standard deviations of the sensor, a reading at rest may be from the first ones.
 const REST_SIGMAS: f64 = 5.0;
 /// How far, in standard deviations, a resting tool is read from where it was sent.
 const TOOL_SIGMAS: f64 = 4.0;
 /// Rows that a velocity at the start is fitted to where it is not measured.
 const VELOCITY_ROWS: usize = 8;
+
+/// An episode from its first row with a pose of the object on; `None` where it has none.
+pub(super) fn from_first_pose(episode: &Episode) -> Option<Cow<'_, Episode>> {
+    let turns = (0..episode.rows()).any(|row| episode.orientation(row).is_some());
+    let whole = |row: &usize| {
+        episode.vector(Channel::ObjectPosition, *row).is_some() && (!turns || episode.orientation(*row).is_some())
+    };
+    let first = (0..episode.rows()).find(whole)?;
+    Some(if first == 0 { Cow::Borrowed(episode) } else { Cow::Owned(episode.part(first..episode.rows())) })
+}
+
+/// The posture in which an arm rests before its tool first moves: the mean of what its joints were read to be; `None` where they were not, or where it begins in
+/// motion, in which a reading is as far off as a sensor is.
+pub(super) fn posture(episode: &Episode, joints: u8) -> Option<JointVector> {
+    let sent = episode.vector(Channel::Command, 0)?;
+    let resting = |row: &usize| episode.vector(Channel::Command, *row) == Some(sent);
+    let rows: Vec<usize> = (0..episode.rows().min(REST_ROWS)).take_while(resting).collect();
+    let mut posture = JointVector::zeros();
+    for joint in 0..joints {
+        let read: Vec<f64> = rows.iter().filter_map(|row| episode.get(Channel::Joint(joint), *row)).collect();
+        if read.len() < LEAST_REST_ROWS {
+            return None;
+        }
+        posture[usize::from(joint)] = read.iter().sum::<f64>() / read.len() as f64;
+    }
+    (joints > 0).then_some(posture)
+}
 
 /// The command at the end of each tick, m, from the command columns, else from where the tool was measured.
 pub(super) fn commands(episode: &Episode, begin_secs: f64, period_secs: f64, ticks: usize) -> Option<Vec<[f64; 3]>> {

@@ -1,0 +1,48 @@
+//! What an arm did, from its joints where nothing else says it.
+
+use std::borrow::Cow;
+
+use measured_log::{Axis, Channel, Episode, Log, Readings};
+use physics_model::rig::RigTool;
+use physics_model::robot::Robot;
+
+use crate::error::Error;
+use crate::nominal::Nominal;
+
+/// A log whose arm is sent to where its joints say that its tool was, if it has neither commands nor places of the tool.
+///
+/// # Errors
+///
+/// [`Error::Unfit`] for an arm's log that has no joints either.
+pub(crate) fn driven<'a>(log: &'a Log, name: &str, nominal: &Nominal) -> Result<Cow<'a, Log>, Error> {
+    let RigTool::Arm(robot) = nominal.tool() else { return Ok(Cow::Borrowed(log)) };
+    let has = |channel: Channel| {
+        let read = |episode: &Episode| episode.channels.get(&channel).is_some_and(|readings| readings.count() > 0);
+        log.episodes.iter().any(read)
+    };
+    if has(Channel::Command(Axis::X)) || has(Channel::Tool(Axis::X)) {
+        return Ok(Cow::Borrowed(log));
+    }
+    if !has(Channel::Joint(0)) {
+        let reason = "expected columns `command_x_m` …, `tool_x_m` … or `joint_0_rad` …, found none of them: `action` alone does not say where the \
+                      arm went"
+            .into();
+        return Err(Error::Unfit { log: name.into(), reason });
+    }
+    let mut log = log.clone();
+    for episode in &mut log.episodes {
+        let places: Vec<Option<[f64; 3]>> = (0..episode.rows()).map(|row| place(episode, row, robot)).collect();
+        for (index, axis) in Axis::ALL.into_iter().enumerate() {
+            let readings: Readings = places.iter().map(|place| place.map(|place| place[index])).collect();
+            episode.channels.insert(Channel::Command(axis), readings);
+        }
+    }
+    Ok(Cow::Owned(log))
+}
+
+/// Centre of the tool in a row, m, base frame, by forward kinematics.
+fn place(episode: &Episode, row: usize, robot: &Robot) -> Option<[f64; 3]> {
+    let joints: Option<Vec<f64>> =
+        (0..robot.joint_count()).map(|joint| episode.get(Channel::Joint(joint as u8), row)).collect();
+    Some(robot.base_from_tool(&joints?).translation.vector.into())
+}
