@@ -1,6 +1,7 @@
 //! From a hidden effect to a planner that knows of it: recorded, diagnosed, planned with, as `docs/diagnose.md` says it.
 
 use crate::docs::play_with;
+use crate::pages::check_diagnosis;
 
 fn table(path: &std::path::Path) -> toml::Table {
     std::fs::read_to_string(path).unwrap().parse().unwrap()
@@ -21,6 +22,8 @@ fn what_diagnose_finds_in_a_recorded_log_the_planner_reckons_with() {
         let value = parameter["value"].as_f64().unwrap();
         assert!((value - truth).abs() < 0.002, "{parameter}");
     }
+    check_diagnosis(&runs.join("tilted/found/report.html"));
+    check_diagnosis(&runs.join("diagnose/tilt-again/report.html"));
     // What has been found once is in the model, and nothing is missing any more.
     assert_eq!(report(&runs.join("diagnose/tilt"))["effects"][0]["name"], "table_tilt");
     assert_eq!(report(&runs.join("diagnose/tilt-again"))["verdict"], "none");

@@ -83,7 +83,7 @@ fn what_cannot_be_printed_is_said() {
 
 #[test]
 fn where_nobody_may_write_programs_say_so() {
-    let benchmark = ("diagnose-benchmark", String::from("--sets 1 --none 0 --unknown 0 --pairs 0"));
+    let benchmark = ("diagnose-benchmark", String::from("--sets 1 --none 0 --unknown 0 --pairs 0 --arms 0"));
     for (binary, arguments) in writers().into_iter().chain([benchmark]) {
         // Not even root makes a folder there.
         let output = command(binary, &arguments).args(["--out", "/proc/nobody/out"]).output().unwrap();

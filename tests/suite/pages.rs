@@ -18,6 +18,10 @@ fn browser() -> Option<&'static str> {
     found
 }
 
+/// Ends of figures without and with a caption.
+const PLAIN: &str = "</svg></figure>";
+const CAPTIONED: &str = "</figcaption></figure>";
+
 /// What the browser prints with these options.
 fn browse(browser: &str, options: &[&str], page: &Path) -> String {
     let profile = tempfile::tempdir().unwrap();
@@ -46,20 +50,29 @@ fn ink(picture: &Path) -> (f64, u32, u32) {
     (other as f64 / pixels.len() as f64, info.width, info.height)
 }
 
-fn check(browser: &str, page: &Path, sections: &[&str], figures: usize) {
+/// `end`: what each figure ends with.
+fn check(browser: &str, page: &Path, sections: &[&str], figures: usize, end: &str) {
     let dom = browse(browser, &["--dump-dom"], page);
     for id in sections {
         assert!(dom.contains(&format!("<section id=\"{id}\">")), "{}: no section {id}", page.display());
     }
     assert_eq!(dom.matches("<figure").count(), figures, "{}", page.display());
     // A browser mends what it cannot read: a mended page would no longer nest as it was written.
-    assert_eq!(dom.matches("</svg></figure>").count(), figures, "{}", page.display());
+    assert_eq!(dom.matches(end).count(), figures, "{}", page.display());
     assert_eq!(dom.matches("<section").count(), sections.len(), "{}", page.display());
     let picture = page.with_extension("png");
     browse(browser, &[&format!("--screenshot={}", picture.display())], page);
     let (ink, width, height) = ink(&picture);
     assert_eq!((width, height), (1100, 1600));
     assert!(ink > 0.02 && ink < 0.98, "{}: {ink} of the pixels are drawn on", page.display());
+}
+
+/// A page of `diagnose` has all its parts and at least three figures, and is drawn.
+pub(crate) fn check_diagnosis(page: &Path) {
+    let Some(browser) = browser() else { return };
+    let figures = std::fs::read_to_string(page).unwrap().matches("<figure").count();
+    assert!(figures >= 3, "{}: {figures}", page.display());
+    check(browser, page, &["what", "where", "gap", "rivals", "nominal", "remains", "reading"], figures, CAPTIONED);
 }
 
 #[test]
@@ -73,17 +86,17 @@ fn the_pages_of_runs_and_episodes_are_whole_in_a_browser() {
     };
     report(&root().join("assets/results/table1-surmise-D4"), "run.html");
     let sections = ["success", "pictures", "failures", "pairs", "trials", "source"];
-    check(browser, &page("run.html"), &sections, 3);
+    check(browser, &page("run.html"), &sections, 3, PLAIN);
 
     report(&root().join("assets/results"), "all.html");
     let figures = std::fs::read_to_string(page("all.html")).unwrap().matches("<figure").count();
     assert!(figures >= 5, "{figures}");
-    check(browser, &page("all.html"), &["table1", "table2", "ablation"], figures);
+    check(browser, &page("all.html"), &["table1", "table2", "ablation"], figures, PLAIN);
 
     let demo = program("demo").args(["--domain", "D4", "--quick", "--out"]).arg(page("demo")).output().unwrap();
     assert!(demo.status.success(), "{}", stderr(&demo));
     let sections = ["above", "belief", "steps", "source"];
-    check(browser, &page("demo").join("episode.html"), &sections, 1);
+    check(browser, &page("demo").join("episode.html"), &sections, 1, PLAIN);
     let (ink, ..) = ink(&page("demo").join("episode.png"));
     assert!(ink > 0.02 && ink < 0.5, "{ink} of the picture's pixels are drawn on");
 }

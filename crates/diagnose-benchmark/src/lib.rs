@@ -13,7 +13,7 @@
 //! use physics_model::EffectKind;
 //!
 //! let (only, actions) = (vec![EffectKind::TableTilt], vec![Actions::Designed]);
-//! let options = Options { version: VERSION, seed: 1, sets: 3, none: 1, unknown: 0, pairs: 0, actions, only };
+//! let options = Options { version: VERSION, seed: 1, sets: 3, none: 1, unknown: 0, pairs: 0, arms: 0, actions, only };
 //! let plan = Plan::new(options);
 //! // Which of the four is which, the order does not say.
 //! let hidden: Vec<String> = (0..plan.len()).flat_map(|set| plan.draw(set, 0).names()).collect();

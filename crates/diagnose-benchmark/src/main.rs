@@ -34,6 +34,9 @@ struct Arguments {
     /// Sets with two effects, of each kind of actions.
     #[arg(long, default_value_t = 40)]
     pairs: u32,
+    /// Sets of an arm, one in three of them without an effect.
+    #[arg(long, default_value_t = 12)]
+    arms: u32,
     /// Kinds of actions.
     #[arg(long, value_delimiter = ',', value_enum, default_values = ["designed", "passive"])]
     actions: Vec<Actions>,
@@ -95,6 +98,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
         none: arguments.none,
         unknown: arguments.unknown,
         pairs: arguments.pairs,
+        arms: arguments.arms,
         actions: arguments.actions.clone(),
         only: arguments.only.clone(),
     };

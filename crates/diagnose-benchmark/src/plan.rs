@@ -12,7 +12,7 @@ use crate::generate::{Actions, ENGINES, RobotName, SetSpec};
 use crate::unknown::Unknown;
 
 /// Version of the sets: another one for every change that makes other logs of the same options.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 
 /// What decides all logs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,6 +30,8 @@ pub struct Options {
     pub unknown: u32,
     /// Sets with two effects.
     pub pairs: u32,
+    /// Sets of an arm, one in three without an effect; the others are pushed by a ball but for what only an arm has.
+    pub arms: u32,
     /// Kinds of actions.
     pub actions: Vec<Actions>,
     /// Effects of the catalogue; all where empty.
@@ -48,6 +50,8 @@ pub enum Group {
     Unknown,
     /// Two effects of the catalogue.
     Pair,
+    /// One effect of the catalogue or none, in the log of an arm.
+    Arm,
 }
 
 /// A truth file.
@@ -101,6 +105,7 @@ impl Plan {
                 (Group::None, options.none),
                 (Group::Unknown, options.unknown),
                 (Group::Pair, options.pairs),
+                (Group::Arm, options.arms),
             ];
             for (group, count) in groups {
                 cells.extend((0..count as usize).map(|index| Cell { group, actions: *actions, index }));
@@ -137,6 +142,7 @@ impl Plan {
                 let noise = if (at / 3 + round) % 2 == 0 { 1.0 } else { 3.0 };
                 one(kinds[at], strength, noise, cell, seed.0, &mut rng)
             }
+            Group::Arm => self.of_arm(cell, seed.0, &mut rng),
             Group::None => {
                 let noise = if cell.index.is_multiple_of(2) { 1.0 } else { 3.0 };
                 let shape = ObjectShape::ALL[cell.index % 3];
@@ -164,6 +170,24 @@ impl Plan {
                 Truth { group: cell.group, strength, spec }
             }
         }
+    }
+
+    /// A set of an arm. Which effect is drawn, not gone through: there are fewer sets than effects.
+    fn of_arm(&self, cell: Cell, seed: u64, rng: &mut Rng) -> Truth {
+        let noise = if cell.index.is_multiple_of(2) { 1.0 } else { 3.0 };
+        if cell.index % 3 == 2 {
+            let shape = ObjectShape::ALL[rng.random_range(0..2)];
+            let spec = SetSpec { robot: RobotName::Sawyer, ..base(shape, noise, cell, seed, rng) };
+            return Truth { group: cell.group, strength: 0, spec };
+        }
+        // Bodies stand where a ball reaches; what only an arm has is among the sets of the catalogue.
+        let elsewhere = [EffectKind::HiddenObstacle, EffectKind::Backlash, EffectKind::JointFriction];
+        let mut kinds = self.kinds(cell.actions);
+        if kinds.iter().any(|kind| !elsewhere.contains(kind)) {
+            kinds.retain(|kind| !elsewhere.contains(kind));
+        }
+        let kind = kinds[rng.random_range(0..kinds.len())];
+        one(kind, cell.index % 3, noise, cell, seed, rng)
     }
 
     /// What the catalogue sets go through.
@@ -203,7 +227,7 @@ fn base(shape: ObjectShape, noise: f64, cell: Cell, seed: u64, rng: &mut Rng) ->
 fn one(kind: EffectKind, strength: usize, noise: f64, cell: Cell, seed: u64, rng: &mut Rng) -> Truth {
     let shape = draw::shape(kind, rng);
     let mut spec = base(shape, noise, cell, seed, rng);
-    if matches!(kind, EffectKind::Backlash | EffectKind::JointFriction) {
+    if cell.group == Group::Arm || matches!(kind, EffectKind::Backlash | EffectKind::JointFriction) {
         spec.robot = RobotName::Sawyer;
     }
     if kind == EffectKind::FrictionLevel {

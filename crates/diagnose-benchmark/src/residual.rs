@@ -44,13 +44,13 @@ fn processes(episodes: &[Simulated]) -> BTreeMap<(Kind, usize), GaussianProcess>
     let fitted = |(component, all): ((Kind, usize), Vec<(usize, usize)>)| {
         let count = all.len().min(POINTS);
         let chosen = (0..count).map(|i| all[i * all.len() / count]);
-        let (x, y): (Vec<Vec<f64>>, Vec<f64>) = chosen
+        let (x, y, groups): (Vec<_>, Vec<_>, Vec<_>) = chosen
             .map(|(episode, index)| {
                 let (trial, readings, residuals) = &episodes[episode];
-                (inputs(trial, readings, trial.blocks[index].first), residuals[index])
+                (inputs(trial, readings, trial.blocks[index].first), residuals[index], episode)
             })
-            .unzip();
-        GaussianProcess::fit(&x, &y).map(|process| (component, process))
+            .collect();
+        GaussianProcess::fit(&x, &y, &groups).map(|process| (component, process))
     };
     blocks.into_iter().collect::<Vec<_>>().into_par_iter().filter_map(fitted).collect()
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::Result;
 use discrepancy::heldout::{self, Explanation};
 use discrepancy::{ModelFile, Nominal, rig_tool};
+use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::folder::{self, Folder};
@@ -102,8 +103,8 @@ pub struct Score {
     pub verdict: String,
     /// Names in the answer.
     pub named: Vec<String>,
-    /// Confidence of the first.
-    pub confidence: Option<f64>,
+    /// Confidence of each.
+    pub confidences: Vec<f64>,
     /// Whether the truth was named, and first.
     pub first: bool,
     /// Whether the truth is in the confusion set.
@@ -112,7 +113,7 @@ pub struct Score {
     pub confusion: usize,
     /// Whether both of a pair were named.
     pub both: bool,
-    /// Of each parameter of the hidden effect that was named first: key and whether its interval holds the true value.
+    /// Of each parameter of the hidden effect that was named first, of pairs of both as far as they were named: key and whether its interval holds the true value.
     pub covered: Vec<(String, bool)>,
     /// Held-out error of re-tuning, of the answer, of the truth, of no re-tuning.
     pub heldout: Option<[f64; 4]>,
@@ -130,6 +131,8 @@ pub struct Score {
 const LEAST_GAP: f64 = 0.02;
 /// Significance of a located residual.
 const P_VALUE: f64 = 0.05;
+/// Confidence of a name that is sure.
+const SURE: f64 = 0.9;
 
 impl Score {
     /// Of an answer.
@@ -139,8 +142,14 @@ impl Score {
         let named: Vec<String> = answer.effects.iter().map(|effect| effect.name.clone()).collect();
         let effect = answer.verdict == "effect";
         let first = effect && named.first() == names.first();
-        let covered =
-            if first && truth.group == Group::Catalogue { covered(truth, &answer.effects[0]) } else { Vec::new() };
+        let covered = match truth.group {
+            Group::Catalogue if first => covered(&truth.spec.effects[0], &answer.effects[0]),
+            Group::Pair if effect => (truth.spec.effects.iter())
+                .filter_map(|effect| Some((effect, answer.effects.iter().find(|e| e.name == effect.kind().name())?)))
+                .flat_map(|(effect, named)| covered(effect, named))
+                .collect(),
+            _ => Vec::new(),
+        };
         Self {
             set,
             actions: truth.spec.actions,
@@ -155,7 +164,7 @@ impl Score {
             heldout: reference.map(|r| [answer.heldout.before, answer.heldout.after, r.truth, r.untuned]),
             process: reference.and_then(|r| r.process),
             channel: answer.located.first().filter(|l| l.p_value < P_VALUE).map(|l| l.channel.clone()),
-            confidence: answer.effects.first().map(|effect| effect.confidence),
+            confidences: answer.effects.iter().map(|effect| effect.confidence).collect(),
             truth: names,
             verdict: answer.verdict.clone(),
             named,
@@ -189,11 +198,26 @@ impl Score {
             .then(|| [after, before].map(|left| ((untuned - left) / (untuned - truth)).min(1.0)))
     }
 
-    /// Whether an effect of the catalogue was given a wrong name, surely.
+    /// Whether nothing was hidden.
+    #[must_use]
+    pub fn is_without_effect(&self) -> bool {
+        self.truth == ["none"]
+    }
+
+    /// Whether something that is not there was named, first or further, surely.
     #[must_use]
     pub fn wrong_and_sure(&self) -> bool {
-        let wrong = self.named.first().is_some_and(|name| !self.truth.contains(name));
-        self.verdict == "effect" && wrong && self.confidence.is_some_and(|confidence| confidence >= 0.9)
+        self.verdict == "effect" && (0..self.named.len()).any(|place| self.is_wrong_and_sure(place))
+    }
+
+    /// Whether the first name is such a one.
+    #[must_use]
+    pub fn first_is_wrong_and_sure(&self) -> bool {
+        self.verdict == "effect" && !self.named.is_empty() && self.is_wrong_and_sure(0)
+    }
+
+    fn is_wrong_and_sure(&self, place: usize) -> bool {
+        !self.truth.contains(&self.named[place]) && self.confidences[place] >= SURE
     }
 
     /// What a confusion matrix counts: the first name, `none` or `unknown`.
@@ -206,8 +230,7 @@ impl Score {
     }
 }
 
-fn covered(truth: &Truth, named: &Named) -> Vec<(String, bool)> {
-    let effect = &truth.spec.effects[0];
+fn covered(effect: &EffectConfig, named: &Named) -> Vec<(String, bool)> {
     let mut values = effect.values();
     if effect.kind() == physics_model::EffectKind::AnisotropicFriction {
         // a at φ is −a at φ ± π/2, and φ is φ + π: the one that is meant.
@@ -298,6 +321,7 @@ mod tests {
             none: 0,
             unknown: 0,
             pairs: 0,
+            arms: 0,
             actions: vec![Actions::Designed],
             only: vec![kind],
         };
@@ -339,6 +363,12 @@ mod tests {
         assert_eq!(score.closed(), None);
         let score = Score::new(0, &truth, &answer(&format!(r#""verdict": "unknown", {wrong}"#)), None);
         assert!(!score.first && !score.wrong_and_sure() && score.says() == "unknown");
+        // A further name is as wrong as a first.
+        let further = r#""verdict": "effect", "confusion_set": ["constant_force"],
+            "effects": [{"name": "constant_force", "confidence": 1.0, "parameters": []},
+                        {"name": "time_base", "confidence": 0.92, "parameters": []}]"#;
+        let score = Score::new(0, &truth, &answer(further), None);
+        assert!(score.first && score.wrong_and_sure() && !score.first_is_wrong_and_sure());
     }
 
     #[test]

@@ -12,7 +12,17 @@ use measured_log::{Format, Notes};
 use physics_model::EffectKind;
 
 fn options(sets: u32, none: u32, unknown: u32, pairs: u32, actions: Actions) -> Options {
-    Options { version: VERSION, seed: 3, sets, none, unknown, pairs, actions: vec![actions], only: Vec::new() }
+    Options {
+        version: VERSION,
+        seed: 3,
+        sets,
+        none,
+        unknown,
+        pairs,
+        arms: sets.min(3),
+        actions: vec![actions],
+        only: Vec::new(),
+    }
 }
 
 fn project() -> PathBuf {
@@ -84,7 +94,21 @@ printf '{"verdict": "none", "effects": [], "confusion_set": [], "located": [], "
 #[cfg(unix)]
 fn benchmark(solver: &Path, out: &Path, more: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_diagnose-benchmark"));
-    command.args(["--sets", "2", "--none", "1", "--unknown", "1", "--pairs", "0", "--actions", "passive", "--only"]);
+    command.args([
+        "--sets",
+        "2",
+        "--none",
+        "1",
+        "--unknown",
+        "1",
+        "--pairs",
+        "0",
+        "--arms",
+        "0",
+        "--actions",
+        "passive",
+        "--only",
+    ]);
     command.args(["table_tilt,force_bias", "--diagnose"]).arg(solver).arg("--out").arg(out).args(more);
     command.output().unwrap()
 }
