@@ -16,7 +16,8 @@ use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Nominal, Tunable};
-use crate::report::{Verdict, verdict};
+use crate::plausible;
+use crate::report::Verdict;
 use crate::rival::Round;
 use crate::screen::{Screening, places};
 use crate::search::Search;
@@ -24,6 +25,7 @@ use crate::simulator::Simulator;
 use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
 use crate::trial::{Trial, groups};
+use crate::verdict::{comes_near, verdict};
 
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
@@ -148,6 +150,12 @@ pub struct Diagnosis {
     pub heldout_counts: Vec<usize>,
     /// Of each held-out episode: number in the log, mean squares of nominal and accepted model.
     pub heldout_episodes: Vec<(u64, f64, f64)>,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Why it is `unknown`.
+    pub reason: Option<String>,
+    /// Effects that the nominal model had before.
+    pub effects_in_model: Vec<&'static str>,
     /// Mean squares of all episodes under the accepted model.
     pub mean_squares: Vec<f64>,
     /// What re-tuning may change.
@@ -170,6 +178,17 @@ pub struct Diagnosis {
     pub pieces: Vec<Range<usize>>,
 }
 
+impl Diagnosis {
+    /// Takes back effects that explain next to nothing: nobody should plan with them.
+    fn without_effects(&mut self, kept: &Study) {
+        self.model = self.nominal.clone();
+        self.heldout[1] = self.heldout[0].clone();
+        self.heldout_episodes.iter_mut().for_each(|(_, before, after)| *after = *before);
+        self.remaining = self.located.clone();
+        self.evidence = Evidence::new(kept, &self.nominal, &self.model);
+    }
+}
+
 /// Diagnoses a log that was read from the folder `name`.
 ///
 /// # Errors
@@ -178,7 +197,8 @@ pub struct Diagnosis {
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
     let log = &*driven(log, name, nominal)?;
     let noise = NoiseLevels::of_log(log);
-    let (trials, [fitted, heldout], left_out) = trials(log, name, nominal, &noise, settings)?;
+    plausible::check(log, name, nominal, &noise, LEAST_FITTED)?;
+    let Compared { trials, sides: [fitted, heldout], left_out } = trials(log, name, nominal, &noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
     let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]);
@@ -208,6 +228,10 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
     let null = rounds[0].base.clone();
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
+    if !heldout.iter().flatten().all(|sum| sum.is_finite()) {
+        let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
+        return Err(Error::Unfit { log: name.into(), reason });
+    }
     // Of each episode, whose pieces come one after another.
     let heldout_episodes = (episodes.heldout.iter())
         .map(|group| {
@@ -237,6 +261,9 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         heldout_counts: episodes.counts,
         heldout_episodes,
         mean_squares,
+        verdict: Verdict::None,
+        reason: None,
+        effects_in_model: nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
         tunables: nominal.tunables.clone(),
         lacking_force: None,
         rollouts: 0,
@@ -244,11 +271,24 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         fitted_ids: episodes.fitted.iter().map(|group| trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };
-    if verdict(&diagnosis, settings) == Verdict::Unknown {
+    (diagnosis.verdict, diagnosis.reason) = verdict(&diagnosis, settings);
+    if diagnosis.verdict == Verdict::Unknown {
         diagnosis.lacking_force = lacking_force(&simulator, chosen, &diagnosis.nominal);
+        if !comes_near(&diagnosis, settings) {
+            diagnosis.without_effects(&search.kept);
+        }
     }
     diagnosis.rollouts = simulator.rollouts();
     Ok(diagnosis)
+}
+
+/// What a log is compared by.
+struct Compared {
+    trials: Vec<Trial>,
+    /// Places of what is fitted and of what is held out.
+    sides: [Vec<usize>; 2],
+    /// Numbers of episodes that cannot be simulated.
+    left_out: Vec<u64>,
 }
 
 /// What the log is compared by, and which of it is fitted and held out.
@@ -258,7 +298,7 @@ fn trials(
     nominal: &Nominal,
     noise: &NoiseLevels,
     settings: &Settings,
-) -> Result<(Vec<Trial>, [Vec<usize>; 2], Vec<u64>), Error> {
+) -> Result<Compared, Error> {
     let split = match settings.fold {
         Some([part, parts]) => log.fold(settings.seed, part, parts),
         None => log.split(settings.seed),
@@ -284,7 +324,7 @@ fn trials(
         );
         return Err(Error::Unfit { log: name.into(), reason });
     }
-    Ok((trials, sides, left_out))
+    Ok(Compared { trials, sides, left_out })
 }
 
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.

@@ -46,3 +46,31 @@ fn place(episode: &Episode, row: usize, robot: &Robot) -> Option<[f64; 3]> {
         (0..robot.joint_count()).map(|joint| episode.get(Channel::Joint(joint as u8), row)).collect();
     Some(robot.base_from_tool(&joints?).translation.vector.into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tool_is_sent_to_where_the_joints_have_it() {
+        const JOINTS: [f64; 7] = [-0.3222, -0.7935, 0.0381, 1.9327, -0.0638, 0.4328, 3.079];
+        let mut header = crate::nominal::tests::uncertain_mass().header().clone();
+        header.robot = measured_log::Robot::Sawyer;
+        let mut episode = Episode { id: 3, time_secs: vec![0.0, 0.02], ..Episode::default() };
+        for (joint, value) in JOINTS.into_iter().enumerate() {
+            let readings: Readings = [Some(value), None].into_iter().collect();
+            episode.channels.insert(Channel::Joint(joint as u8), readings);
+        }
+        let log = Log { header: header.clone(), episodes: vec![episode] };
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let nominal = Nominal::new(&header, crate::rig_tool(&log, Some(&root)).unwrap()).unwrap();
+        let RigTool::Arm(robot) = nominal.tool() else { panic!("an arm") };
+        let sent = driven(&log, "log", &nominal).unwrap();
+        let expected: [f64; 3] = robot.base_from_tool(&JOINTS).translation.vector.into();
+        assert_eq!(sent.episodes[0].vector(Channel::Command, 0), Some(expected));
+        assert_eq!(sent.episodes[0].vector(Channel::Command, 1), None);
+        // What is commanded stays.
+        let again = driven(&sent, "log", &nominal).unwrap();
+        assert!(matches!(again, Cow::Borrowed(_)));
+    }
+}

@@ -53,6 +53,7 @@ pub mod nominal;
 pub mod obstacle;
 mod page;
 mod patch;
+mod plausible;
 pub mod report;
 pub mod rival;
 pub mod screen;
@@ -62,6 +63,7 @@ pub mod simulator;
 pub mod study;
 pub mod terms;
 pub mod trial;
+mod verdict;
 pub mod whitener;
 
 use std::path::Path;

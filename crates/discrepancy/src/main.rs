@@ -27,9 +27,9 @@ struct Arguments {
     /// Holds out part I of K of the episodes instead of the share that the log says: K runs make a cross-validation.
     #[arg(long, value_name = "I/K", value_parser = fold)]
     fold: Option<[usize; 2]>,
-    /// Worker threads [default: all cores]; the answer does not depend on it.
-    #[arg(long)]
-    threads: Option<usize>,
+    /// Worker threads, 0 for all cores [default: 0]; the answer does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
+    threads: Option<u64>,
     /// Prints report.json.
     #[arg(long)]
     json: bool,
@@ -55,29 +55,32 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let started = Instant::now();
     if let Some(threads) = arguments.threads {
         // Fails where a pool exists already: not here.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
     }
     let log = measured_log::read(&arguments.measured)?;
     let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
-    if let Some(path) = &arguments.model {
-        ModelFile::read(path)?.apply(&mut nominal)?;
-    }
-    // Before a minute is spent on what could not be written.
     let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.measured));
+    let begun = match &arguments.model {
+        Some(path) => Some(begin_with(path, &out, &mut nominal)?),
+        None => None,
+    };
+    // Before a minute is spent on what could not be written.
     whole_file::check_owner(&out, "report.json").map_err(|source| Error::Taken { source })?;
     let made: Vec<PathBuf> = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
     std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
+    check_writable(&out)?;
     let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
     let name = arguments.measured.display().to_string();
     let diagnosis = diagnose(&log, &name, &nominal, &settings).inspect_err(|_| {
         // A log that says too little leaves nothing behind.
         made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
     })?;
-    let report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
+    let mut report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
+    report.model = arguments.model.as_ref().map(|path| path.display().to_string());
     let json =
         serde_json::to_string_pretty(&report).map_err(|error| Error::Model { reason: error.to_string() })? + "\n";
-    let model = ModelFile::new(&nominal, &diagnosis, &report).to_toml()?;
-    for (file, text) in [("model.toml", &model), ("report.html", &page(&name, &report)), ("report.json", &json)] {
+    let model = ModelFile::new(&nominal, &diagnosis, &report, begun.as_ref()).to_toml()?;
+    for (file, text) in FILES.into_iter().zip([&model, &page(&name, &report), &json]) {
         whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
     }
     if arguments.json {
@@ -86,6 +89,36 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         print_summary(&report, &out);
     }
     Ok(())
+}
+
+/// What is written, the report last: with it all is there.
+const FILES: [&str; 3] = ["model.toml", "report.html", "report.json"];
+/// Worker threads, at most.
+const MOST_THREADS: u64 = 1024;
+
+/// Gives a nominal model what the file at `path` says; it must not be one that this diagnosis would write over.
+fn begin_with(path: &Path, out: &Path, nominal: &mut Nominal) -> Result<ModelFile, Error> {
+    let model = ModelFile::read(path)?;
+    let refuse = |reason: String| Error::Model { reason: format!("{}: {reason}", path.display()) };
+    if path.canonicalize().ok().is_some_and(|path| out.join("model.toml").canonicalize().is_ok_and(|own| own == path)) {
+        return Err(refuse(
+            "expected another folder for the results than the model's: --out would write over it".into(),
+        ));
+    }
+    match model.apply(nominal) {
+        Err(Error::Model { reason }) => Err(refuse(reason)),
+        done => done.map(|()| model),
+    }
+}
+
+/// Whether the results can be written: a disk may refuse, and where a file has to go a folder may be.
+fn check_writable(out: &Path) -> Result<(), Error> {
+    let refuse = |path: PathBuf, source| Error::Folder { path, source };
+    if let Some(taken) = FILES.iter().map(|file| out.join(file)).find(|path| path.is_dir()) {
+        return Err(refuse(taken, std::io::Error::other("expected a file or nothing there, found a folder")));
+    }
+    let probe = out.join(format!(".writable-{}", std::process::id()));
+    std::fs::write(&probe, "").and_then(|()| std::fs::remove_file(&probe)).map_err(|source| refuse(probe, source))
 }
 
 /// Parts of a cross-validation, at most.
@@ -107,13 +140,31 @@ fn default_folder(measured: &Path) -> PathBuf {
     Path::new("runs/diagnose").join(name.unwrap_or_else(|| "log".into()))
 }
 
+/// Chance below which a part of the gap is told.
+const SIGNIFICANT: f64 = 0.05;
+
+/// Digits after the point that show the width of an interval.
+fn decimals([low, high]: [f64; 2]) -> usize {
+    let width = high - low;
+    if width > 0.0 && width.is_finite() { (1.0 - width.log10().floor()).clamp(0.0, 9.0) as usize } else { 4 }
+}
+
 fn print_summary(report: &Report, out: &Path) {
     whole_file::out!("{}", report.summary);
+    if let Some(reason) = &report.reason {
+        whole_file::out!("  why unknown: {reason}");
+    }
     for effect in &report.effects {
         whole_file::out!("  {} (confidence {:.2}): {}", effect.name, effect.confidence, effect.description);
         for value in &effect.parameters {
             let [low, high] = value.interval90;
-            whole_file::out!("    {} = {:.4} {} (90 %: {low:.4} to {high:.4})", value.key, value.value, value.unit);
+            let digits = decimals([low, high]);
+            whole_file::out!(
+                "    {} = {:.digits$} {} (90 %: {low:.digits$} to {high:.digits$})",
+                value.key,
+                value.value,
+                value.unit
+            );
         }
     }
     let names = report.confusion_set.join(", ");
@@ -125,7 +176,8 @@ fn print_summary(report: &Report, out: &Path) {
     if let Some(description) = &report.description {
         whole_file::out!("  what is left: {description}");
     }
-    for cell in report.located.iter().take(3).filter(|cell| cell.share > 0.0) {
+    let stands_out = |cell: &&discrepancy::locate::Cell| cell.share > 0.0 && cell.p_value <= SIGNIFICANT;
+    for cell in report.located.iter().filter(stands_out).take(3) {
         let (channel, phase) = (cell.channel.name(), cell.phase.name());
         whole_file::out!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
     }

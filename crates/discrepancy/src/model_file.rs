@@ -20,10 +20,11 @@ use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
 use whole_file::one_line;
 
+use crate::candidate::tied_to_a_place;
 use crate::diagnosis::Diagnosis;
 use crate::error::Error;
 use crate::nominal::Nominal;
-use crate::report::Report;
+use crate::report::{NamedEffect, Report};
 
 /// Version of the format.
 const VERSION: u32 = 1;
@@ -61,25 +62,26 @@ struct Interval {
     interval90: [f64; 2],
 }
 
+fn intervals(effect: &NamedEffect) -> impl Iterator<Item = Interval> + '_ {
+    effect.parameters.iter().map(|value| Interval {
+        effect: effect.name.into(),
+        key: value.key.clone(),
+        value: value.value,
+        interval90: value.interval90,
+    })
+}
+
 impl ModelFile {
-    /// Of a diagnosis that began with `nominal`.
+    /// Of a diagnosis that began with `nominal`, which is what the file `begun` made of it.
     #[must_use]
-    pub fn new(nominal: &Nominal, diagnosis: &Diagnosis, report: &Report) -> Self {
+    pub fn new(nominal: &Nominal, diagnosis: &Diagnosis, report: &Report, begun: Option<&Self>) -> Self {
         let found = diagnosis.model.model.hypothesis(&diagnosis.model.x).effects;
+        let known = begun.map_or(&[][..], |begun| &begun.interval);
         Self {
             version: VERSION,
             nominal: report.retuned.iter().map(|value| (value.key.clone(), value.value)).collect(),
             effects: Effects { model: nominal.effects.iter().cloned().chain(found).collect() },
-            interval: (report.effects.iter())
-                .flat_map(|effect| {
-                    effect.parameters.iter().map(|value| Interval {
-                        effect: effect.name.into(),
-                        key: value.key.clone(),
-                        value: value.value,
-                        interval90: value.interval90,
-                    })
-                })
-                .collect(),
+            interval: known.iter().cloned().chain(report.effects.iter().flat_map(intervals)).collect(),
         }
     }
 
@@ -117,8 +119,12 @@ impl ModelFile {
                 return Err(refuse(format!("key `interval`: expected finite numbers for {}", part.key)));
             }
         }
-        for effect in &file.effects.model {
+        for (index, effect) in file.effects.model.iter().enumerate() {
             effect.check().map_err(|error| refuse(format!("key `effects.model`: {error}")))?;
+            let kind = effect.kind();
+            if !tied_to_a_place(kind) && file.effects.model[..index].iter().any(|other| other.kind() == kind) {
+                return Err(refuse(format!("key `effects.model`: expected {} once, found it again", kind.name())));
+            }
         }
         Ok(file)
     }
@@ -165,13 +171,17 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("model.toml");
         let long = format!("version = 1\n{} = 1", "a".repeat(100_000));
-        let cases: [(&[u8], &str); 7] = [
+        let cases: [(&[u8], &str); 8] = [
             (b"version = 1\n[nominal]\na = = 2\n", "line 3"),
             (b"version = 1\n\"a\\nb\" = 1", "a b"),
             (long.as_bytes(), "unknown field"),
             (b"\xff", "utf-8"),
             (b"version = 1\n[nominal]\na = nan\n", "`nominal.a`: expected -1000000 to 1000000, found NaN"),
             (b"version = 1\n[nominal]\na = 1e308\n", "`nominal.a`"),
+            (
+                b"version = 1\n[effects]\nmodel = [{ force_gain = { gain = 1.1 } }, { force_gain = { gain = 1.2 } }]\n",
+                "force_gain once",
+            ),
             (b"version = 1\n[[interval]]\neffect = 'a'\nkey = 'b'\nvalue = inf\ninterval90 = [0, 1]\n", "finite"),
         ];
         for (bytes, expected) in cases {

@@ -76,6 +76,136 @@ fn a_part_that_is_none_is_refused() {
     }
 }
 
+/// Samples in which the columns `names` of each row are another number.
+fn each(text: &str, names: &[&str], change: impl Fn(f64) -> f64) -> String {
+    let mut lines = text.lines();
+    let head = lines.next().unwrap();
+    let columns: Vec<usize> = head.split(',').enumerate().filter(|(_, n)| names.contains(n)).map(|(i, _)| i).collect();
+    assert_eq!(columns.len(), names.len());
+    let row = |line: &str| {
+        let cell = |(i, cell): (usize, &str)| match cell.parse::<f64>() {
+            Ok(value) if columns.contains(&i) => change(value).to_string(),
+            _ => cell.into(),
+        };
+        line.split(',').enumerate().map(cell).collect::<Vec<String>>().join(",") + "\n"
+    };
+    format!("{head}\n{}", lines.map(row).collect::<String>())
+}
+
+/// Every row of an episode is its first one.
+fn still(text: &str) -> String {
+    let mut first = String::new();
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.splitn(3, ',').collect();
+        if cells[1] == "0" || first.is_empty() {
+            first = cells[2].into();
+        }
+        format!("{},{},{first}\n", cells[0], cells[1])
+    };
+    text.lines().map(row).collect()
+}
+
+#[test]
+fn numbers_that_cannot_be_meant_are_refused_before_anything_is_simulated() {
+    type Change = fn(&str) -> String;
+    const OBJECT: [&str; 3] = ["object_x_m", "object_y_m", "object_z_m"];
+    let cases: [(&str, Change, &str); 8] = [
+        ("log.toml", |text| text.replace("period_secs = 0.02", "period_secs = 1e-9"), "about as many rows as"),
+        ("log.toml", |text| text.replace("period_secs = 0.02", "period_secs = 9.0"), "about as many rows as"),
+        ("samples.csv", |text| each(text, &["time_secs"], |t| 1e3 * t), "about as many rows as"),
+        ("samples.csv", |text| each(text, &OBJECT, |x| 1e3 * x), "are positions in m"),
+        ("samples.csv", |text| still(text), "something moves"),
+        (
+            "log.toml",
+            |text| text.replace("mass_kg = { mean = 0.5, stddev = 0.075 }", "mass_kg = 1e-300"),
+            "object.mass_kg",
+        ),
+        ("log.toml", |text| text.replace("com_m = [0.0,", "com_m = [0.5,"), "object.com_m[0]"),
+        ("log.toml", |text| text.replace("object_position_m = 0.0005", "object_position_m = 1e-300"), "noise.object"),
+    ];
+    for (file, change, expected) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("deep/out");
+        let output = diagnose(&changed(folder.path(), file, change), &out);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{message}");
+        assert!(message.contains(expected) && message.contains("log"), "{message}");
+        assert!(!folder.path().join("deep").exists(), "{message}");
+    }
+}
+
+#[test]
+fn results_are_not_written_over_the_model_and_not_where_they_cannot_be() {
+    let log = root().join("tests/data/mujoco-logs/logs/set-002");
+    let run = |out: &Path, more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_diagnose"));
+        let output = command.arg("--measured").arg(&log).arg("--out").arg(out).args(more).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("model.toml");
+    std::fs::write(&model, "version = 1\n[effects]\nmodel = []\n").unwrap();
+    let (code, message) = run(folder.path(), &["--model", model.to_str().unwrap()]);
+    assert!(code == Some(2) && message.contains("write over") && message.contains("model.toml"), "{message}");
+    let taken = tempfile::tempdir().unwrap();
+    std::fs::create_dir(taken.path().join("report.html")).unwrap();
+    let (code, message) = run(taken.path(), &[]);
+    assert!(code == Some(1) && message.contains("report.html") && message.contains("found a folder"), "{message}");
+    let (code, message) = run(&taken.path().join("out"), &["--threads", "100000"]);
+    assert!(code == Some(2) && message.contains("0..=1024"), "{message}");
+}
+
+/// A log of a Sawyer whose joints follow one another around, beside an object that rests.
+fn of_an_arm(folder: &Path, columns: bool) -> PathBuf {
+    const HOME: [f64; 7] = [-0.3222, -0.7935, 0.0381, 1.9327, -0.0638, 0.4328, 3.079];
+    let log = folder.join("log");
+    std::fs::create_dir(&log).unwrap();
+    let header = "version = 1\nrobot = \"sawyer\"\nperiod_secs = 0.02\ngravity_mps2 = 9.81\n[table]\nheight_m = -0.1\nfriction = 0.4\n[object]\nshape = \"box\"\n\
+                  size_m = [0.08, 0.06, 0.05]\nmass_kg = 0.5\ncom_m = [0.0, 0.0, 0.0]\n[noise]\nobject_position_m = 0.0005\nobject_orientation_rad = 0.003\n\
+                  joint_position_rad = 0.001\n[split]\nholdout_fraction = 0.3\n";
+    std::fs::write(log.join("log.toml"), header).unwrap();
+    let joints: String = if columns { (0..7).map(|j| format!(",joint_{j}_rad")).collect() } else { String::new() };
+    let mut text = format!(
+        "episode,time_secs,action,object_x_m,object_y_m,object_z_m,object_qx,object_qy,object_qz,object_qw{joints}\n"
+    );
+    for episode in 0..8_u32 {
+        for row in 0..40_u32 {
+            // The first pose is missing: the episode begins with the second row.
+            let pose = if row == 0 { ",,,,,," } else { "0.9,0.4,-0.075,0,0,0,1" };
+            text += &format!("{episode},{},2,{pose}", 0.02 * f64::from(row));
+            let turned = 0.004 * f64::from(row.saturating_sub(12));
+            for (joint, home) in HOME.iter().enumerate().filter(|_| columns) {
+                text += &format!(",{}", if joint == 0 { home + turned } else { *home });
+            }
+            text += "\n";
+        }
+    }
+    std::fs::write(log.join("samples.csv"), text).unwrap();
+    log
+}
+
+#[test]
+fn joints_suffice_for_an_arm_and_actions_alone_do_not_say_where_it_went() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |log: &Path| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_diagnose"));
+        command.arg("--measured").arg(log).arg("--out").arg(folder.path().join("out")).arg("--root").arg(root());
+        command.arg("--json").output().unwrap()
+    };
+    let output = run(&of_an_arm(folder.path(), true));
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["left_out"], serde_json::json!([]));
+    assert!(report["evidence"]["errors"].as_array().unwrap().iter().any(|error| error["channel"] == "joint_position"));
+
+    let other = tempfile::tempdir().unwrap();
+    let output = run(&of_an_arm(other.path(), false));
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("`action` alone does not say where"), "{message}");
+}
+
 #[test]
 fn a_broken_log_ends_with_code_2_one_sentence_and_nothing_written() {
     type Change = fn(&str) -> String;

@@ -22,7 +22,7 @@ fn of(log: &Log, set: &str, model: Option<&ModelFile>) -> (Report, ModelFile) {
     let settings = Settings::default();
     let diagnosis = diagnose(log, set, &nominal, &settings).unwrap();
     let report = Report::new(&diagnosis, &settings, 0.0);
-    let model = ModelFile::new(&nominal, &diagnosis, &report);
+    let model = ModelFile::new(&nominal, &diagnosis, &report, model);
     (report, model)
 }
 

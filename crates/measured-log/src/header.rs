@@ -195,6 +195,21 @@ impl Header {
     }
 }
 
+impl Shape {
+    /// How far from its origin it goes along each of its axes, m: a centre of mass is within.
+    fn reach_m(&self) -> [f64; 3] {
+        match self {
+            Self::Box { size_m } => size_m.map(|size| 0.5 * size.mean()),
+            Self::Cylinder { radius_m, height_m } => [radius_m.mean(), radius_m.mean(), 0.5 * height_m.mean()],
+            Self::Sphere { radius_m } => [radius_m.mean(); 3],
+            Self::Prism { outline_m, height_m, .. } => {
+                let reach = |axis: usize| outline_m.iter().map(|corner| corner[axis].abs()).fold(0.0, f64::max);
+                [reach(0), reach(1), 0.5 * height_m.mean()]
+            }
+        }
+    }
+}
+
 impl Object {
     fn check(&self) -> Result<(), Problem> {
         let length = |key: &str, value: Number| within(key, value, Range::Positive, 10.0);
@@ -216,8 +231,9 @@ impl Object {
             }
         }
         within("object.mass_kg", self.mass_kg, Range::Positive, 1e4)?;
+        let reach_m = self.shape.reach_m();
         for (i, value) in self.com_m.iter().enumerate() {
-            within(&format!("object.com_m[{i}]"), *value, Range::Any, 10.0)?;
+            within(&format!("object.com_m[{i}]"), *value, Range::Any, reach_m[i])?;
         }
         if let Some(inertia) = &self.inertia_kgm2 {
             for (i, value) in inertia.iter().enumerate() {
@@ -240,6 +256,9 @@ impl Object {
     }
 }
 
+/// Smallest of what is more than 0, in units of its key: what is less can be no measure of a thing that robots push, and makes simulations overflow.
+const SMALLEST: f64 = 1e-9;
+
 #[derive(Clone, Copy, PartialEq)]
 enum Range {
     Any,
@@ -249,14 +268,14 @@ enum Range {
 
 /// Refuses what is not finite, out of range, or uncertain by nothing.
 fn within(key: &str, number: Number, range: Range, limit: f64) -> Result<(), Problem> {
-    let (mean, low) = (number.mean(), if range == Range::Any { -limit } else { 0.0 });
-    let inside = mean >= low && mean <= limit && (range != Range::Positive || mean > 0.0);
-    if !inside {
-        let expected = match range {
-            Range::Positive => format!("more than 0 and at most {limit}"),
-            _ => format!("{low} to {limit}"),
-        };
-        return Err(Problem::key(key, format!("expected {expected}, found {mean}")));
+    let low = match range {
+        Range::Any => -limit,
+        Range::NotNegative => 0.0,
+        Range::Positive => SMALLEST,
+    };
+    let mean = number.mean();
+    if !(mean >= low && mean <= limit) {
+        return Err(Problem::key(key, format!("expected {low:?} to {limit}, found {mean}")));
     }
     if let Number::Uncertain { stddev, .. } = number
         && !(stddev > 0.0 && stddev.is_finite())

@@ -120,7 +120,7 @@ pub(super) fn ranking(report: &Report) -> String {
         (false, 0 | 1) => "<p><b>Confusion set:</b> no other effect explains this log as well.</p>".into(),
         (false, _) => format!("<p><b>Not told apart by this log:</b> {names}.</p>"),
     };
-    out + &format!("<p><b>Next experiment:</b> {}</p>", escape(&report.next_experiment))
+    out
 }
 
 fn bar(axis: &Axis, rival: &RankedEffect, best: f64) -> String {

@@ -15,9 +15,11 @@ fn class(value: f64) -> usize {
     if value > 1.0 { (4.0 * value.log10()).round().min(8.0) as usize } else { 0 }
 }
 
-fn cell(value: f64, mark: &str) -> String {
+/// `faint`: what does not stand out.
+fn cell(value: f64, mark: &str, faint: bool) -> String {
     if value.is_finite() {
-        format!("<td class=\"h{}\">{}{mark}</td>", class(value), mean_square(value))
+        let faint = if faint && class(value) > 0 { " faint" } else { "" };
+        format!("<td class=\"h{}{faint}\">{}{mark}</td>", class(value), mean_square(value))
     } else {
         format!("<td class=\"void\">–{mark}</td>")
     }
@@ -47,8 +49,8 @@ pub(super) fn by_phase(cells: &[Cell]) -> String {
         out += &format!("<tr><th scope=\"row\">{}</th>", words(channel.name()));
         for phase in &phases {
             out += &match row.get(phase) {
-                Some(found) if found.p_value <= SIGNIFICANT => cell(found.mean_square, "&#8239;*"),
-                Some(found) => cell(found.mean_square, ""),
+                Some(found) if found.p_value <= SIGNIFICANT => cell(found.mean_square, "&#8239;*", false),
+                Some(found) => cell(found.mean_square, "", true),
                 None => "<td class=\"void\">·</td>".into(),
             };
         }
@@ -66,7 +68,7 @@ fn key(cells: &[Cell]) -> String {
     let marked = cells.iter().any(|cell| cell.p_value <= SIGNIFICANT);
     let marked = if marked { "" } else { " No cell here does." };
     out + "</tr></tbody></table><p class=\"soft\">Mean square of the residuals: 1 is noise; the darkest or brightest, 100 and more. * stands out in most episodes: p ≤ 0.05, corrected for the \
-           number of cells."
+           number of cells; pale: does not, single episodes or errors of the engine."
         + marked
         + "</p>"
 }
@@ -82,7 +84,10 @@ fn over_time(cells: &[Cell]) -> String {
         let (channel, phase) = (words(found.channel.name()), found.phase.name());
         out += &format!("<tr><th scope=\"row\">{channel}, {phase}</th>");
         for value in found.over_time {
-            out += &value.map_or_else(|| "<td class=\"void\">·</td>".into(), |value| cell(value, ""));
+            out += &value.map_or_else(
+                || "<td class=\"void\">·</td>".into(),
+                |value| cell(value, "", found.p_value > SIGNIFICANT),
+            );
         }
         out += "</tr>";
     }

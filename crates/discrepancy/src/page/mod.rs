@@ -56,18 +56,29 @@ fn verdict(title: &str, report: &Report) -> String {
     }];
     if let Some(first) = report.effects.first() {
         facts.push((format!("{} %", fixed(100.0 * heldout.closed_fraction, 0)), "of the gap closed"));
-        facts.push((effects::confidence(first.confidence), "confidence in the name"));
+        if report.verdict == Verdict::Effect {
+            facts.push((effects::confidence(first.confidence), "confidence in the name"));
+        }
     }
     facts.push((report.heldout.episodes.len().to_string(), "episodes held out"));
     let facts: String =
         facts.iter().map(|(number, what)| format!("<li><b>{number}</b><span>{what}</span></li>")).collect();
-    let call = match &report.description {
-        Some(description) => format!("<p class=\"call\">What is left: {}.</p>", escape(description)),
-        None => String::new(),
-    };
+    let mut call = String::new();
+    if let Some(reason) = &report.reason {
+        call += &format!("<p class=\"call\">Why unknown: {}.</p>", escape(reason));
+    }
+    if let Some(description) = &report.description {
+        call += &format!("<p class=\"call\">What is left: {}.</p>", escape(description));
+    }
+    let begun = report.model.as_ref().map_or(String::new(), |model| {
+        let effects: Vec<String> = report.effects_in_model.iter().map(|name| html::words(name)).collect();
+        let effects = if effects.is_empty() { "no effect".into() } else { effects.join(", ") };
+        format!("<p class=\"soft\">Begun with {}, which has {effects}.</p>", escape(model))
+    });
     format!(
-        "<header><p class=\"log\">{title}</p><span class=\"badge {class}\">{badge}</span><h1>{}</h1>{call}<ul class=\"facts\">{facts}</ul></header>",
-        escape(&report.summary)
+        "<header><p class=\"log\">{title}</p><span class=\"badge {class}\">{badge}</span><h1>{}</h1>{begun}{call}<ul class=\"facts\">{facts}</ul><p><b>Next:</b> {}</p></header>",
+        escape(&report.summary),
+        escape(&report.next_experiment)
     )
 }
 

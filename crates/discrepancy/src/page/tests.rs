@@ -80,7 +80,9 @@ fn report(verdict: Verdict) -> Report {
             explained_share: 0.87,
             terms: vec![FoundTerm {
                 name: "near_place",
-                description: "towards or from (-0.019, 0.075) m, falling with the distance".into(),
+                description:
+                    "towards (-0.019, 0.075) m, or from it where `strength` is negative, falling with the distance"
+                        .into(),
                 share: 0.87,
                 coefficients: vec![Coefficient { key: "strength", unit: "N m²", value: 0.000_853 }],
             }],
@@ -104,6 +106,9 @@ fn report(verdict: Verdict) -> Report {
         seed: 1,
         fold: None,
         left_out: Vec::new(),
+        reason: None,
+        model: None,
+        effects_in_model: Vec::new(),
         rollouts: 3600,
         seconds: 41.0,
     }

@@ -174,7 +174,9 @@ impl Term {
             Self::TowardsPlace => "towards a place, in proportion to the distance".into(),
             Self::AroundPlace => "around a place, in proportion to the distance".into(),
             Self::NearPlace { place_m: [x, y] } => {
-                format!("towards or from ({x:.3}, {y:.3}) m, falling with the distance")
+                format!(
+                    "towards ({x:.3}, {y:.3}) m, or from it where `strength` is negative, falling with the distance"
+                )
             }
             Self::AgainstMotionByPlace => "against the motion, changing along the table".into(),
             Self::AgainstMotionInStripes { axis, wave_m } => {
