@@ -179,6 +179,17 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// Says what it is, and of a gap that nothing explains what it follows.
+    fn judge(&mut self, study: &Study, kept: &Study, settings: &Settings) {
+        (self.verdict, self.reason) = verdict(self, settings);
+        if self.verdict == Verdict::Unknown {
+            self.lacking_force = lacking_force(study.simulator, &study.chosen, &self.nominal);
+            if !comes_near(self, settings) {
+                self.without_effects(kept);
+            }
+        }
+    }
+
     /// Takes back effects that explain next to nothing: nobody should plan with them.
     fn without_effects(&mut self, kept: &Study) {
         self.model = self.nominal.clone();
@@ -206,15 +217,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search to all episodes, with care
     // where nothing explains much more.
     let study = Study::new(&simulator, engine, fitted);
-    let tunables = nominal.tunables.len();
-    let first = fit(&study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
-    let places = places(&study, &first);
-    let mut part = study.part(&places);
-    part.learn_errors(&first.model.hypothesis(&first.x));
-    let model = Model::nominal(tunables, part.engine_errors());
-    let mut x = first.x;
-    x.resize(model.count(), 0.0);
-    let null = fit(&part, model, Begin::at(&x), Effort::Quick);
+    let (null, part, places) = null_model(&study);
     let context = context(&study, &null, log, &noise);
     let screening = Screening::new(&part, places, &null, &candidates(&context));
     let kept = Study::new(&simulator, engine, heldout);
@@ -271,15 +274,22 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         fitted_ids: episodes.fitted.iter().map(|group| trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };
-    (diagnosis.verdict, diagnosis.reason) = verdict(&diagnosis, settings);
-    if diagnosis.verdict == Verdict::Unknown {
-        diagnosis.lacking_force = lacking_force(&simulator, chosen, &diagnosis.nominal);
-        if !comes_near(&diagnosis, settings) {
-            diagnosis.without_effects(&search.kept);
-        }
-    }
+    diagnosis.judge(&search.study, &search.kept, settings);
     diagnosis.rollouts = simulator.rollouts();
     Ok(diagnosis)
+}
+
+/// The null hypothesis, re-tuned, and the episodes of the screening, with errors learnt near it.
+fn null_model<'a>(study: &Study<'a>) -> (Fit, Study<'a>, Vec<usize>) {
+    let tunables = study.simulator.nominal.tunables.len();
+    let first = fit(study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let places = places(study, &first);
+    let mut part = study.part(&places);
+    part.learn_errors(&first.model.hypothesis(&first.x));
+    let model = Model::nominal(tunables, part.engine_errors());
+    let mut x = first.x;
+    x.resize(model.count(), 0.0);
+    (fit(&part, model, Begin::at(&x), Effort::Quick), part, places)
 }
 
 /// What a log is compared by.

@@ -275,7 +275,13 @@ fn within(key: &str, number: Number, range: Range, limit: f64) -> Result<(), Pro
     };
     let mean = number.mean();
     if !(mean >= low && mean <= limit) {
-        return Err(Problem::key(key, format!("expected {low:?} to {limit}, found {mean}")));
+        return Err(Problem::key(
+            key,
+            format!(
+                "expected {} to {limit}, found {mean}",
+                if low == SMALLEST { "1e-9".into() } else { low.to_string() }
+            ),
+        ));
     }
     if let Number::Uncertain { stddev, .. } = number
         && !(stddev > 0.0 && stddev.is_finite())
