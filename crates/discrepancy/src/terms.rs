@@ -31,6 +31,8 @@ const NEARLY: f64 = 0.02;
 const FLOOR: f64 = 0.1;
 /// A term has to explain this share of all.
 const LEAST_SHARE: f64 = 0.03;
+/// What differs from one episode to the next is told if it is more than this share of what is left.
+const MOST: f64 = 0.5;
 /// Windows and episodes that say anything.
 const LEAST: [usize; 2] = [40, 6];
 /// Force on the object that the re-tuned nominal model lacks, and what it follows. Base axes.
@@ -46,6 +48,8 @@ pub struct LackingForce {
     pub noise_n: f64,
     /// Share of its square, weighted by what the sensors' noise leaves of a window, that all terms and another friction explain in episodes left out. The terms were chosen by it.
     pub explained_share: f64,
+    /// Share of what they leave that is one force in each episode and another in the next, beyond chance.
+    pub between_episodes_share: f64,
     /// Terms, the first that was found first; none where it follows none of the library.
     pub terms: Vec<FoundTerm>,
 }
@@ -57,12 +61,21 @@ impl LackingForce {
             "the re-tuned nominal model lacks a force on the object, {:.2} N (root mean square beyond noise while it moves)",
             (self.root_mean_square_n.powi(2) - self.noise_n.powi(2)).max(0.0).sqrt()
         );
+        let differs = if self.between_episodes_share > MOST {
+            format!(
+                "; {:.0} % of what is left of it lasts as long as an episode and is another in the next: look for what changes between them (how the object stands, \
+                 the surface, the zero of the force sensor)",
+                100.0 * self.between_episodes_share
+            )
+        } else {
+            String::new()
+        };
         if self.terms.is_empty() {
-            return format!("{lacks}, that follows no term that was tried");
+            return format!("{lacks}, that follows no term that was tried{differs}");
         }
         let terms: Vec<String> =
             self.terms.iter().map(|term| format!("{} ({:.0} %)", term.description, 100.0 * term.share)).collect();
-        format!("{lacks}: {}", terms.join("; "))
+        format!("{lacks}: {}{differs}", terms.join("; "))
     }
 }
 
@@ -172,6 +185,29 @@ fn reach<'a>(windows: impl Iterator<Item = &'a Window>, axis: usize) -> [f64; 2]
     [low - BEYOND * (high - low), high + BEYOND * (high - low)]
 }
 
+/// Share of the square of what terms leave that a mean of its own for each episode explains, beyond what chance gives to so many means (ω², Hays 1963, of a
+/// one-way analysis of variance about 0).
+fn between_episodes(episodes: &[&Vec<Window>], terms: &[Term], values: &[f64], middle: &Middle) -> f64 {
+    let left = |window: &Window| -> [f64; 3] {
+        let columns = terms.iter().flat_map(|term| term.columns(window, middle));
+        columns.zip(values).fold(window.lacking_n, |left, (column, value)| {
+            std::array::from_fn(|axis| left[axis] - value * column[axis])
+        })
+    };
+    let (mut total, mut between, mut freedoms) = (0.0, 0.0, 0.0);
+    for windows in episodes {
+        let left: Vec<[f64; 3]> = windows.iter().map(left).collect();
+        let n = left.len() as f64;
+        for axis in 0..middle.axes {
+            total += left.iter().map(|force| force[axis].powi(2)).sum::<f64>();
+            between += left.iter().map(|force| force[axis]).sum::<f64>().powi(2) / n;
+        }
+        freedoms += (n - 1.0) * middle.axes as f64;
+    }
+    let within = (total - between) / f64::max(freedoms, 1.0);
+    ((between - (episodes.len() * middle.axes) as f64 * within) / (total + within).max(1e-300)).clamp(0.0, 1.0)
+}
+
 /// What is lacking, and what it follows; `None` where too little moves to say. `episodes`: the windows of each.
 fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
     let episodes: Vec<&Vec<Window>> = episodes.iter().filter(|windows| !windows.is_empty()).collect();
@@ -246,6 +282,7 @@ fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
         root_mean_square_n: (squares.iter().sum::<f64>() / count as f64).sqrt(),
         noise_n: root(mean(&|window| window.variance_n2)),
         explained_share: shares.iter().sum(),
+        between_episodes_share: between_episodes(&episodes, &terms, values.as_slice(), &middle),
         terms: found,
     })
 }

@@ -77,6 +77,7 @@ fn report(verdict: Verdict) -> Report {
             episodes: 20,
             root_mean_square_n: 0.374,
             noise_n: 0.041,
+            between_episodes_share: 0.1,
             explained_share: 0.87,
             terms: vec![FoundTerm {
                 name: "near_place",

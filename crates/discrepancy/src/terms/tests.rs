@@ -51,6 +51,19 @@ fn a_swirl_turns_around_its_place() {
 }
 
 #[test]
+fn a_force_that_is_another_in_each_episode_is_told_as_that() {
+    // As good as random, one in each direction.
+    let found =
+        pushes(5, 20, |w| [0.5 * (1e4 * w.velocity_mps[0]).sin(), 0.5 * (1e4 * w.velocity_mps[1]).cos()]).unwrap();
+    assert!(found.terms.is_empty(), "{found:?}");
+    // A force of 0.35 N beside noise of 0.1 N an axis.
+    assert!((0.85..0.97).contains(&found.between_episodes_share), "{found:?}");
+    assert!(found.sentence().contains("another in the next"));
+    let noise = pushes(6, 20, |_| [0.0; 2]).unwrap();
+    assert!(noise.between_episodes_share < 0.05 && !noise.sentence().contains("another"), "{noise:?}");
+}
+
+#[test]
 fn a_spring_pulls_towards_its_place_and_a_magnet_where_it_is_near() {
     let spring = pushes(2, 15, |w| [-5.0 * (w.place_m[0] - 0.04), -5.0 * w.place_m[1]]).unwrap();
     assert_eq!(spring.terms[0].name, "towards_place", "{spring:?}");
