@@ -112,7 +112,7 @@ impl Candidate {
     /// Whether a log may have several of its kind, each at a place of its own.
     #[must_use]
     pub fn tied_to_a_place(&self) -> bool {
-        tied_to_a_place(self.kind())
+        matches!(self.kind(), EffectKind::FrictionPatch | EffectKind::HiddenObstacle)
     }
 
     /// The effect at coordinates `a`, one for each of [`Self::coordinates`]; they are held within their ranges.
@@ -178,11 +178,6 @@ impl Candidate {
     pub fn strengths(&self) -> impl Iterator<Item = usize> + '_ {
         self.coordinates.iter().enumerate().filter(|(_, c)| c.strength).map(|(index, _)| index)
     }
-}
-
-/// Whether there may be several of a kind, each at a place of its own.
-pub(crate) fn tied_to_a_place(kind: EffectKind) -> bool {
-    matches!(kind, EffectKind::FrictionPatch | EffectKind::HiddenObstacle)
 }
 
 /// All candidates that could show in such a log.

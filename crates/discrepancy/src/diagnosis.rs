@@ -180,23 +180,26 @@ pub struct Diagnosis {
 
 impl Diagnosis {
     /// Says what it is, and of a gap that nothing explains what it follows.
-    fn judge(&mut self, study: &Study, kept: &Study, settings: &Settings) {
+    fn judge(&mut self, study: &Study, settings: &Settings) {
         (self.verdict, self.reason) = verdict(self, settings);
         if self.verdict == Verdict::Unknown {
             self.lacking_force = lacking_force(study.simulator, &study.chosen, &self.nominal);
-            if !comes_near(self, settings) {
-                self.without_effects(kept);
+            if !self.model.model.parts.is_empty() && !comes_near(self) {
+                self.without_effects();
             }
         }
     }
 
     /// Takes back effects that explain next to nothing: nobody should plan with them.
-    fn without_effects(&mut self, kept: &Study) {
+    fn without_effects(&mut self) {
+        let tried: Vec<&str> = self.model.model.parts.iter().map(|part| part.kind().name()).collect();
+        self.reason =
+            self.reason.take().map(|reason| format!("{reason} (the best that was tried: {})", tried.join(", ")));
         self.model = self.nominal.clone();
         self.heldout[1] = self.heldout[0].clone();
         self.heldout_episodes.iter_mut().for_each(|(_, before, after)| *after = *before);
         self.remaining = self.located.clone();
-        self.evidence = Evidence::new(kept, &self.nominal, &self.model);
+        self.evidence.take_back();
     }
 }
 
@@ -274,7 +277,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         fitted_ids: episodes.fitted.iter().map(|group| trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };
-    diagnosis.judge(&search.study, &search.kept, settings);
+    diagnosis.judge(&search.study, settings);
     diagnosis.rollouts = simulator.rollouts();
     Ok(diagnosis)
 }

@@ -95,6 +95,19 @@ pub struct Residuals {
 }
 
 impl Evidence {
+    /// After as before: no effect is accepted.
+    pub(crate) fn take_back(&mut self) {
+        self.path.after = self.path.before.clone();
+        if let Some(course) = &mut self.course {
+            course.after = course.before.clone();
+        }
+        self.residuals.histogram[1] = self.residuals.histogram[0].clone();
+        self.residuals.autocorrelation[1] = self.residuals.autocorrelation[0].clone();
+        for error in &mut self.errors {
+            (error.after, error.median_after) = (error.before, error.median_before);
+        }
+    }
+
     /// Of the held-out episodes.
     #[must_use]
     pub fn new(kept: &Study, null: &Fit, accepted: &Fit) -> Self {

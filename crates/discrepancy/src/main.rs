@@ -68,13 +68,12 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     whole_file::check_owner(&out, "report.json").map_err(|source| Error::Taken { source })?;
     let made: Vec<PathBuf> = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
     std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
-    check_writable(&out)?;
+    let clean = || made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
+    check_writable(&out).inspect_err(|_| clean())?;
     let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
     let name = arguments.measured.display().to_string();
-    let diagnosis = diagnose(&log, &name, &nominal, &settings).inspect_err(|_| {
-        // A log that says too little leaves nothing behind.
-        made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
-    })?;
+    // A log that says too little leaves nothing behind.
+    let diagnosis = diagnose(&log, &name, &nominal, &settings).inspect_err(|_| clean())?;
     let mut report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
     report.model = arguments.model.as_ref().map(|path| path.display().to_string());
     let json =

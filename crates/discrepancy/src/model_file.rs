@@ -20,7 +20,6 @@ use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
 use whole_file::one_line;
 
-use crate::candidate::tied_to_a_place;
 use crate::diagnosis::Diagnosis;
 use crate::error::Error;
 use crate::nominal::Nominal;
@@ -119,12 +118,8 @@ impl ModelFile {
                 return Err(refuse(format!("key `interval`: expected finite numbers for {}", part.key)));
             }
         }
-        for (index, effect) in file.effects.model.iter().enumerate() {
+        for effect in &file.effects.model {
             effect.check().map_err(|error| refuse(format!("key `effects.model`: {error}")))?;
-            let kind = effect.kind();
-            if !tied_to_a_place(kind) && file.effects.model[..index].iter().any(|other| other.kind() == kind) {
-                return Err(refuse(format!("key `effects.model`: expected {} once, found it again", kind.name())));
-            }
         }
         Ok(file)
     }
@@ -171,17 +166,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("model.toml");
         let long = format!("version = 1\n{} = 1", "a".repeat(100_000));
-        let cases: [(&[u8], &str); 8] = [
+        let cases: [(&[u8], &str); 7] = [
             (b"version = 1\n[nominal]\na = = 2\n", "line 3"),
             (b"version = 1\n\"a\\nb\" = 1", "a b"),
             (long.as_bytes(), "unknown field"),
             (b"\xff", "utf-8"),
             (b"version = 1\n[nominal]\na = nan\n", "`nominal.a`: expected -1000000 to 1000000, found NaN"),
             (b"version = 1\n[nominal]\na = 1e308\n", "`nominal.a`"),
-            (
-                b"version = 1\n[effects]\nmodel = [{ force_gain = { gain = 1.1 } }, { force_gain = { gain = 1.2 } }]\n",
-                "force_gain once",
-            ),
             (b"version = 1\n[[interval]]\neffect = 'a'\nkey = 'b'\nvalue = inf\ninterval90 = [0, 1]\n", "finite"),
         ];
         for (bytes, expected) in cases {

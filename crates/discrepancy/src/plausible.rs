@@ -1,6 +1,6 @@
 //! Logs whose numbers cannot mean what they say: other units cost hours of simulation and a report about nothing.
 
-use measured_log::{Axis, Channel, Episode, Log};
+use measured_log::{Axis, Channel, Component, Episode, Log, Number};
 
 use crate::error::Error;
 use crate::noise::NoiseLevels;
@@ -8,7 +8,7 @@ use crate::nominal::Nominal;
 use crate::trial::Kind;
 
 /// Ticks a row, or rows a tick, at most: logs may be thinned, and lack rows.
-const TICKS_A_ROW: f64 = 20.0;
+const TICKS_A_ROW: f64 = 100.0;
 /// Ticks of an episode that need no rows.
 const SHORT: f64 = 1000.0;
 /// Ticks of a log, at most.
@@ -45,11 +45,15 @@ pub(crate) fn check(log: &Log, name: &str, nominal: &Nominal, noise: &NoiseLevel
     }
     if nominal.has_tool() {
         let (table_m, size_m) = (log.header.table.height_m.mean(), nominal.largest_size_m());
+        let unsure_m = match log.header.table.height_m {
+            Number::Uncertain { stddev, .. } => 3.0 * stddev,
+            Number::Fixed(_) => 0.0,
+        };
         for episode in &log.episodes {
             let place = (0..episode.rows()).find_map(|row| episode.vector(Channel::ObjectPosition, row));
             let Some([_, _, z]) = place else { continue };
             let height_m = z - table_m;
-            if height_m.abs() > 2.0 * size_m + 0.05 {
+            if height_m.abs() > 2.0 * size_m + 0.05 + unsure_m {
                 return refuse(format!(
                     "episode {}: expected an object of {size_m} m that begins on the table at table.height_m = {table_m}, found its centre {height_m} m above it: are \
                      positions in m, and in the same frame?",
@@ -79,7 +83,13 @@ fn moves(episode: &Episode, has_tool: bool, noise: &NoiseLevels) -> bool {
         })
     };
     let of = |kind: Kind| MOVES * noise.of(kind).unwrap_or(0.0);
-    beyond(Channel::ObjectPosition, of(Kind::ObjectPosition))
+    let turns = Component::ALL.iter().any(|component| {
+        let read = (0..episode.rows()).filter_map(|row| episode.get(Channel::ObjectOrientation(*component), row));
+        let (low, high) = read.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        high - low > of(Kind::ObjectOrientation)
+    });
+    turns
+        || beyond(Channel::ObjectPosition, of(Kind::ObjectPosition))
         || (has_tool
             && (beyond(Channel::Command, COMMAND_M) || beyond(Channel::Tool, of(Kind::ToolPosition).max(COMMAND_M))))
 }

@@ -147,7 +147,7 @@ pub struct Report {
 }
 
 /// Confidence, at most, in what does not explain the gap: something else is at least as likely.
-pub(crate) const NO_LIKELIER: f64 = 0.5;
+const NO_LIKELIER: f64 = 0.5;
 
 /// What a further effect gains, as a share of what those before it did, that errors of the engine make of nothing: ln evidence of it over nothing is divided by this.
 /// Of seeds 17 to 20 of the benchmark ten further names of single effects that were wrong gained 0.6 to 13 %, 57 right ones of pairs 1.5 % and more, 17 of them less than 10 %.
@@ -251,7 +251,7 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> 
 
 /// Probability of what gains so much among its rivals, of these gains, and nothing; equal prior odds, ln evidences divided by the temperature, those over
 /// nothing by `noise`.
-pub(crate) fn confidence(gain: f64, others: impl Iterator<Item = f64>, temperature: f64, noise: f64) -> f64 {
+fn confidence(gain: f64, others: impl Iterator<Item = f64>, temperature: f64, noise: f64) -> f64 {
     let odds = |other: f64| ((other - gain) / temperature).exp();
     1.0 / (1.0 + others.map(odds).sum::<f64>() + (-gain / noise).exp())
 }

@@ -139,7 +139,9 @@ pub fn next_experiment(
     let like = telling.map_or(String::new(), |Telling { episode, ln_odds }| {
         format!(" Of this log episode {episode} says most of it ({ln_odds:+.1} of ln odds): more like that one.")
     });
-    for other in confusion_set.iter().skip(1) {
+    for (place, other) in confusion_set.iter().enumerate().skip(1) {
+        // What tells the first two apart says nothing of the first and a third.
+        let like = if place == 1 { like.as_str() } else { "" };
         let pair = PAIRS.iter().find(|(a, b, _)| first == Some(a) && other == b || first == Some(b) && other == a);
         if let Some((a, b, how)) = pair {
             return format!("{a} or {b}: {how}.{like}");

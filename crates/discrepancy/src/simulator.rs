@@ -111,7 +111,11 @@ impl<'a> Simulator<'a> {
         let object = self.nominal.object(&hypothesis.z, trial.added_mass_kg, engine);
         let effects: Vec<Box<dyn Effect>> = configs().map(EffectConfig::build).collect();
         let body = nudged(&trial.start, &trial.start_stddev, nudge);
-        let start = RigStart { joints_rad: trial.joints_rad, ..RigStart::of_episode(body, trial.tool_m) };
+        let start = RigStart {
+            joints_rad: trial.joints_rad,
+            time_secs: trial.begin_secs,
+            ..RigStart::of_episode(body, trial.tool_m)
+        };
         // What went wrong on the way is as far from what was measured as the rest of the episode is.
         let mut readings =
             rig.run(&object, &effects, &start, &trial.commands).unwrap_or_else(|error| error.readings().to_vec());

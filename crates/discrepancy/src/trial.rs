@@ -119,6 +119,8 @@ pub struct Trial {
     pub(crate) share: usize,
     /// Command at the end of each tick; of the free body only the number counts.
     pub commands: Vec<[f64; 3]>,
+    /// Time of the start since the episode began, s.
+    pub begin_secs: f64,
     /// Known weight, kg.
     pub added_mass_kg: f64,
     /// The object as first read.
@@ -155,9 +157,11 @@ impl Trial {
     pub fn of_episode(log: &Log, episode: &Episode, noise: &NoiseLevels, has_tool: bool) -> Vec<Self> {
         let pieces = if has_tool { Vec::new() } else { shots::shots(log, episode, noise) };
         if pieces.is_empty() {
-            let Some(episode) = start::from_first_pose(episode) else { return Vec::new() };
-            let start = start::start(&episode, noise);
-            return start.and_then(|start| Self::begun(log, &episode, noise, has_tool, start)).into_iter().collect();
+            let Some(part) = start::from_first_pose(episode) else { return Vec::new() };
+            let start = start::start(&part, noise);
+            let whole = start.and_then(|start| Self::begun(log, &part, noise, has_tool, start));
+            let weight = (0..episode.rows()).find_map(|row| episode.get(Channel::AddedMass, row));
+            return whole.map(|whole| Self { added_mass_kg: weight.unwrap_or(0.0), ..whole }).into_iter().collect();
         }
         shared(pieces)
     }
@@ -210,6 +214,7 @@ impl Trial {
             id: episode.id,
             ticks,
             share: WHOLE,
+            begin_secs: if has_tool { begin_secs } else { 0.0 },
             commands: commands.unwrap_or_else(|| vec![[0.0; 3]; ticks]),
             added_mass_kg,
             start,

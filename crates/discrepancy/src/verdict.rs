@@ -4,8 +4,7 @@ use std::ops::Range;
 
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::likelihood::{NOISE_FLOOR, mean_square, trimmed_mean};
-use crate::report::{NO_LIKELIER, Verdict, confidence};
-use crate::rival::Round;
+use crate::report::Verdict;
 
 /// A model that closes more of the gap than this explains it, whatever the solver's errors leave.
 const CLOSED: f64 = 0.95;
@@ -15,6 +14,9 @@ const NEARLY_CLOSED: f64 = 0.9;
 
 /// A mean square that nothing explains, whatever share of the gap is closed: of 1200 logs in which an effect was named rightly none had 3.
 const HOPELESS: f64 = 10.0;
+
+/// What closes less than this of the held-out gap comes near nothing.
+const LEAST_CLOSED: f64 = 0.2;
 
 /// An effect that closes less than this of a gap stands for something else.
 const HALF: f64 = 0.5;
@@ -86,22 +88,11 @@ fn is_left(trimmed_mean: f64, chance: f64, closed_fraction: f64, settings: &Sett
     })
 }
 
-/// Whether the effects of a model that does not explain the gap are worth telling: the first is likelier than not among what was compared, and held-out episodes are
-/// explained better.
-pub(crate) fn comes_near(diagnosis: &Diagnosis, settings: &Settings) -> bool {
+/// Whether the effects of a model that does not explain the gap are worth telling: they close a part of it. Which of several that do as well it is, the confusion set
+/// says.
+pub(crate) fn comes_near(diagnosis: &Diagnosis) -> bool {
     let [before, after] = heldout_errors(diagnosis);
-    let Some(round) = diagnosis.rounds.first().filter(|_| !diagnosis.model.model.parts.is_empty()) else {
-        return false;
-    };
-    after < before && first_confidence(round, &diagnosis.heldout_counts, settings.temperature) >= NO_LIKELIER
-}
-
-/// Confidence in the first effect of a round among its rivals and nothing, before which nothing was explained.
-fn first_confidence(round: &Round, counts: &[usize], temperature: f64) -> f64 {
-    let gain = round.rivals[0].gain;
-    let passed = round.passed_over(counts);
-    let others = round.rivals.iter().skip(1).map(|rival| rival.gain).chain(passed.iter().map(|(_, more)| gain + more));
-    confidence(gain, others, temperature, temperature)
+    !diagnosis.model.model.parts.is_empty() && closed_fraction(before, after) > LEAST_CLOSED
 }
 
 /// Whether what is named closes so little of the gaps of typical episodes, of those held out or of those fitted, that something else makes them. Of each

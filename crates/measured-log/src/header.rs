@@ -237,7 +237,13 @@ impl Object {
         }
         if let Some(inertia) = &self.inertia_kgm2 {
             for (i, value) in inertia.iter().enumerate() {
-                within(&format!("object.inertia_kgm2[{i}]"), *value, Range::Positive, 1e6)?;
+                within(&format!("object.inertia_kgm2[{i}]"), *value, Range::NotNegative, 1e6)?;
+                if value.mean() <= 0.0 {
+                    return Err(Problem::key(
+                        format!("object.inertia_kgm2[{i}]"),
+                        String::from("expected more than 0, found 0"),
+                    ));
+                }
             }
             let mean = inertia.map(Number::mean);
             let sum: f64 = mean.iter().sum();

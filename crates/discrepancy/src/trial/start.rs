@@ -21,13 +21,18 @@ const TOOL_SIGMAS: f64 = 4.0;
 /// Rows that a velocity at the start is fitted to where it is not measured.
 const VELOCITY_ROWS: usize = 8;
 
-/// An episode from its first row with a pose of the object on; `None` where it has none.
+/// An episode from its first row with a pose of the object on; `None` where it has none, or where the tool is under way by then: what that has stirred nobody
+/// has seen.
 pub(super) fn from_first_pose(episode: &Episode) -> Option<Cow<'_, Episode>> {
     let turns = (0..episode.rows()).any(|row| episode.orientation(row).is_some());
     let whole = |row: &usize| {
         episode.vector(Channel::ObjectPosition, *row).is_some() && (!turns || episode.orientation(*row).is_some())
     };
     let first = (0..episode.rows()).find(whole)?;
+    let sent = |row: usize| episode.vector(Channel::Command, row);
+    if (1..=first).any(|row| sent(row).is_some() && sent(row) != sent(0)) {
+        return None;
+    }
     Some(if first == 0 { Cow::Borrowed(episode) } else { Cow::Owned(episode.part(first..episode.rows())) })
 }
 
