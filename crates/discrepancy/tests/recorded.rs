@@ -122,7 +122,7 @@ fn what_the_catalogue_does_not_have_is_called_unknown() {
     let value = |key: &str| term.coefficients.iter().find(|coefficient| coefficient.key == key).unwrap().value;
     assert_eq!(term.name, "near_place");
     assert!(value("strength") > 0.0 && (value("x") + 0.054).hypot(value("y") - 0.005) < 0.04, "{lacking:?}");
-    assert!(found.description.unwrap().contains("towards or from"));
+    assert!(found.description.unwrap().contains("falling with the distance"));
 }
 
 #[test]
