@@ -1,8 +1,8 @@
 //! The pushing task as a generative model: conformance, rewards, sensors, determinism.
 
-mod hypotheses;
 #[path = "../support/mod.rs"]
 mod support;
+mod unknown_effects;
 
 use physics_model::config::ObstacleMobility;
 use physics_model::world::World;
