@@ -97,6 +97,14 @@ pub fn middle_90(mut values: Vec<f64>) -> [f64; 2] {
     [at(0.05), at(0.95)]
 }
 
+/// Decimals at which an interval still shows two digits of its half-width.
+#[must_use]
+pub fn decimals(interval: [f64; 2], value: f64) -> usize {
+    let half = 0.5 * (interval[1] - interval[0]).abs();
+    let size = if half > 0.0 && half.is_finite() { half } else { 0.1 * value.abs() };
+    if size > 0.0 && size.is_finite() { (1 - size.log10().floor() as i32).clamp(0, 8) as usize } else { 2 }
+}
+
 #[cfg(test)]
 mod tests {
     use pomdp::{Purpose, Seed};

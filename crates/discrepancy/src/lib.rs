@@ -3,7 +3,7 @@
 //! # Method
 //!
 //! 1. A [`Trial`](trial::Trial) is an episode of the log, or a piece of a toss: what a simulation starts from, and what it is compared with. It runs
-//!    freely from its first row, driven by the logged commands.
+//!    freely from its first row with a pose of the object, driven by the logged commands.
 //! 2. The null hypothesis is the nominal model with its uncertain numbers re-tuned within their priors ([`nominal`]).
 //! 3. A right model's residuals are not white: solvers and starts differ, and such errors last for the rest of an episode. Simulations with other
 //!    solver settings and other starts say what they look like. A [`whitener`] takes them out of each episode; those of the engine are also the

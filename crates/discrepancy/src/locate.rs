@@ -40,6 +40,17 @@ pub struct Cell {
     pub over_time: [Option<f64>; TIMES],
 }
 
+/// Chance below which a cell stands out.
+const SIGNIFICANT: f64 = 0.05;
+
+impl Cell {
+    /// Whether it stands out in most episodes.
+    #[must_use]
+    pub fn stands_out(&self) -> bool {
+        self.p_value <= SIGNIFICANT
+    }
+}
+
 #[derive(Default)]
 struct Sums {
     /// Σ r² of each episode, and its number of residuals.

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
+use discrepancy::interval::decimals;
 use discrepancy::{Error, ModelFile, Nominal, Report, Settings, diagnose, page, rig_tool};
 use whole_file::Existing;
 
@@ -139,15 +140,6 @@ fn default_folder(measured: &Path) -> PathBuf {
     Path::new("runs/diagnose").join(name.unwrap_or_else(|| "log".into()))
 }
 
-/// Chance below which a part of the gap is told.
-const SIGNIFICANT: f64 = 0.05;
-
-/// Digits after the point that show the width of an interval.
-fn decimals([low, high]: [f64; 2]) -> usize {
-    let width = high - low;
-    if width > 0.0 && width.is_finite() { (1.0 - width.log10().floor()).clamp(0.0, 9.0) as usize } else { 4 }
-}
-
 fn print_summary(report: &Report, out: &Path) {
     whole_file::out!("{}", report.summary);
     if let Some(reason) = &report.reason {
@@ -157,7 +149,7 @@ fn print_summary(report: &Report, out: &Path) {
         whole_file::out!("  {} (confidence {:.2}): {}", effect.name, effect.confidence, effect.description);
         for value in &effect.parameters {
             let [low, high] = value.interval90;
-            let digits = decimals([low, high]);
+            let digits = decimals(value.interval90, value.value);
             whole_file::out!(
                 "    {} = {:.digits$} {} (90 %: {low:.digits$} to {high:.digits$})",
                 value.key,
@@ -175,14 +167,12 @@ fn print_summary(report: &Report, out: &Path) {
     if let Some(description) = &report.description {
         whole_file::out!("  what is left: {description}");
     }
-    let stands_out = |cell: &&discrepancy::locate::Cell| cell.share > 0.0 && cell.p_value <= SIGNIFICANT;
-    for cell in report.located.iter().filter(stands_out).take(3) {
+    for cell in report.located.iter().filter(|cell| cell.share > 0.0 && cell.stands_out()).take(3) {
         let (channel, phase) = (cell.channel.name(), cell.phase.name());
         whole_file::out!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
     }
-    if !report.left_out.is_empty() {
-        let ids: Vec<String> = report.left_out.iter().map(u64::to_string).collect();
-        whole_file::out!("  left out, without a pose of the object and a row after it: episodes {}", ids.join(", "));
+    if let Some(sentence) = report.left_out_sentence() {
+        whole_file::out!("  {sentence}");
     }
     whole_file::out!("  next: {}", report.next_experiment);
     whole_file::out!(

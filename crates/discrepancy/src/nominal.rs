@@ -171,17 +171,6 @@ impl Nominal {
         &self.header
     }
 
-    /// Largest of the object's sizes, m; of an outline the distance of its corners across.
-    pub(crate) fn largest_size_m(&self) -> f64 {
-        let across = |points: &[[f64; 2]]| 2.0 * points.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
-        match &self.header.object.shape {
-            Shape::Box { size_m } => size_m.iter().map(|size| size.mean()).fold(0.0, f64::max),
-            Shape::Cylinder { radius_m, height_m } => height_m.mean().max(2.0 * radius_m.mean()),
-            Shape::Sphere { radius_m } => 2.0 * radius_m.mean(),
-            Shape::Prism { outline_m, height_m, .. } => height_m.mean().max(across(outline_m)),
-        }
-    }
-
     /// What moves by command.
     #[must_use]
     pub fn tool(&self) -> &RigTool {

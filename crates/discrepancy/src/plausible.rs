@@ -44,7 +44,8 @@ pub(crate) fn check(log: &Log, name: &str, nominal: &Nominal, noise: &NoiseLevel
         return refuse(format!("expected at most {MOST_TICKS} ticks of period_secs = {period_secs} s, found {all:.0}"));
     }
     if nominal.has_tool() {
-        let (table_m, size_m) = (log.header.table.height_m.mean(), nominal.largest_size_m());
+        let (table_m, size_m) =
+            (log.header.table.height_m.mean(), 2.0 * log.header.object.shape.reach_m().into_iter().fold(0.0, f64::max));
         let unsure_m = match log.header.table.height_m {
             Number::Uncertain { stddev, .. } => 3.0 * stddev,
             Number::Fixed(_) => 0.0,

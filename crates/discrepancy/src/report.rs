@@ -154,6 +154,18 @@ const NO_LIKELIER: f64 = 0.5;
 const SECOND_ERROR: f64 = 0.03;
 
 impl Report {
+    /// Which episodes were left out, if any.
+    #[must_use]
+    pub fn left_out_sentence(&self) -> Option<String> {
+        let ids: Vec<String> = self.left_out.iter().map(u64::to_string).collect();
+        (!ids.is_empty()).then(|| {
+            format!(
+                "Left out, without a pose of the object before the tool moves and a row after it: episodes {}",
+                ids.join(", ")
+            )
+        })
+    }
+
     /// What a diagnosis says.
     #[must_use]
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {

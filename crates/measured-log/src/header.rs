@@ -168,20 +168,20 @@ pub struct SplitConfig {
 impl Header {
     /// The first value that is out of range.
     pub(crate) fn check(&self) -> Result<(), Problem> {
-        within("period_secs", self.period_secs.into(), Range::Positive, 10.0)?;
-        within("gravity_mps2", self.gravity_mps2.into(), Range::NotNegative, 100.0)?;
+        within("period_secs", self.period_secs.into(), Range::From(SMALLEST), 10.0)?;
+        within("gravity_mps2", self.gravity_mps2.into(), Range::From(0.0), 100.0)?;
         if let Some(radius) = self.tool_radius_m {
-            within("tool_radius_m", radius.into(), Range::Positive, 10.0)?;
+            within("tool_radius_m", radius.into(), Range::From(SMALLEST), 10.0)?;
         }
         if let Some(friction) = self.tool_friction {
-            within("tool_friction", friction, Range::NotNegative, 10.0)?;
+            within("tool_friction", friction, Range::From(0.0), 10.0)?;
         }
         within("table.height_m", self.table.height_m, Range::Any, 100.0)?;
-        within("table.friction", self.table.friction, Range::NotNegative, 10.0)?;
+        within("table.friction", self.table.friction, Range::From(0.0), 10.0)?;
         self.object.check()?;
         for (key, stddev) in self.noise.entries() {
             if let Some(stddev) = stddev {
-                within(&format!("noise.{key}"), stddev.into(), Range::Positive, 1e6)?;
+                within(&format!("noise.{key}"), stddev.into(), Range::From(SMALLEST), 1e6)?;
             }
         }
         let fraction = self.split.holdout_fraction;
@@ -197,7 +197,8 @@ impl Header {
 
 impl Shape {
     /// How far from its origin it goes along each of its axes, m: a centre of mass is within.
-    fn reach_m(&self) -> [f64; 3] {
+    #[must_use]
+    pub fn reach_m(&self) -> [f64; 3] {
         match self {
             Self::Box { size_m } => size_m.map(|size| 0.5 * size.mean()),
             Self::Cylinder { radius_m, height_m } => [radius_m.mean(), radius_m.mean(), 0.5 * height_m.mean()],
@@ -212,7 +213,7 @@ impl Shape {
 
 impl Object {
     fn check(&self) -> Result<(), Problem> {
-        let length = |key: &str, value: Number| within(key, value, Range::Positive, 10.0);
+        let length = |key: &str, value: Number| within(key, value, Range::From(SMALLEST), 10.0);
         match &self.shape {
             Shape::Box { size_m } => {
                 for (i, value) in size_m.iter().enumerate() {
@@ -230,20 +231,14 @@ impl Object {
                 outline::check_feet(feet_m).map_err(|reason| Problem::key("object.feet_m", reason))?;
             }
         }
-        within("object.mass_kg", self.mass_kg, Range::Positive, 1e4)?;
+        within("object.mass_kg", self.mass_kg, Range::From(SMALLEST), 1e4)?;
         let reach_m = self.shape.reach_m();
         for (i, value) in self.com_m.iter().enumerate() {
             within(&format!("object.com_m[{i}]"), *value, Range::Any, reach_m[i])?;
         }
         if let Some(inertia) = &self.inertia_kgm2 {
             for (i, value) in inertia.iter().enumerate() {
-                within(&format!("object.inertia_kgm2[{i}]"), *value, Range::NotNegative, 1e6)?;
-                if value.mean() <= 0.0 {
-                    return Err(Problem::key(
-                        format!("object.inertia_kgm2[{i}]"),
-                        String::from("expected more than 0, found 0"),
-                    ));
-                }
+                within(&format!("object.inertia_kgm2[{i}]"), *value, Range::From(SMALLEST_INERTIA), 1e6)?;
             }
             let mean = inertia.map(Number::mean);
             let sum: f64 = mean.iter().sum();
@@ -256,7 +251,7 @@ impl Object {
             }
         }
         if let Some(restitution) = self.restitution {
-            within("object.restitution", restitution, Range::NotNegative, 1.0)?;
+            within("object.restitution", restitution, Range::From(0.0), 1.0)?;
         }
         Ok(())
     }
@@ -264,30 +259,28 @@ impl Object {
 
 /// Smallest of what is more than 0, in units of its key: what is less can be no measure of a thing that robots push, and makes simulations overflow.
 const SMALLEST: f64 = 1e-9;
+/// The same of a moment of inertia, kg m²: that of a grain of sand.
+const SMALLEST_INERTIA: f64 = 1e-15;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Range {
+    /// Either sign.
     Any,
-    NotNegative,
-    Positive,
+    /// This or more.
+    From(f64),
 }
 
 /// Refuses what is not finite, out of range, or uncertain by nothing.
 fn within(key: &str, number: Number, range: Range, limit: f64) -> Result<(), Problem> {
     let low = match range {
         Range::Any => -limit,
-        Range::NotNegative => 0.0,
-        Range::Positive => SMALLEST,
+        Range::From(low) => low,
     };
     let mean = number.mean();
     if !(mean >= low && mean <= limit) {
-        return Err(Problem::key(
-            key,
-            format!(
-                "expected {} to {limit}, found {mean}",
-                if low == SMALLEST { "1e-9".into() } else { low.to_string() }
-            ),
-        ));
+        // As short as it is written: 1e-9, 0.
+        let low = format!("{low:?}");
+        return Err(Problem::key(key, format!("expected {} to {limit}, found {mean}", low.trim_end_matches(".0"))));
     }
     if let Number::Uncertain { stddev, .. } = number
         && !(stddev > 0.0 && stddev.is_finite())

@@ -3,9 +3,10 @@
 use physics_model::EffectKind;
 use physics_model::effect::Neutral;
 
-use super::html::{decimals, escape, fixed, log_evidence, significant, words};
+use super::html::{escape, fixed, log_evidence, significant, words};
 use super::svg::{Axis, strip, strip_labels};
 use crate::diagnosis::Settings;
+use crate::interval::decimals;
 use crate::report::{NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
 
 /// The named effects.

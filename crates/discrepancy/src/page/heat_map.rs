@@ -7,8 +7,6 @@ use crate::locate::{Cell, TIMES};
 
 /// Rows of the map over time.
 const ROWS: usize = 8;
-/// Chance below which a cell is marked.
-const SIGNIFICANT: f64 = 0.05;
 
 /// Class of a mean square: four to a decade above noise.
 fn class(value: f64) -> usize {
@@ -49,7 +47,7 @@ pub(super) fn by_phase(cells: &[Cell]) -> String {
         out += &format!("<tr><th scope=\"row\">{}</th>", words(channel.name()));
         for phase in &phases {
             out += &match row.get(phase) {
-                Some(found) if found.p_value <= SIGNIFICANT => cell(found.mean_square, "&#8239;*", false),
+                Some(found) if found.stands_out() => cell(found.mean_square, "&#8239;*", false),
                 Some(found) => cell(found.mean_square, "", true),
                 None => "<td class=\"void\">·</td>".into(),
             };
@@ -65,7 +63,7 @@ fn key(cells: &[Cell]) -> String {
     for (class, label) in ["1", "1.8", "3.2", "5.6", "10", "18", "32", "56", "100"].into_iter().enumerate() {
         out += &format!("<td class=\"h{class}\">{label}</td>");
     }
-    let marked = cells.iter().any(|cell| cell.p_value <= SIGNIFICANT);
+    let marked = cells.iter().any(Cell::stands_out);
     let marked = if marked { "" } else { " No cell here does." };
     out + "</tr></tbody></table><p class=\"soft\">Mean square of the residuals: 1 is noise; the darkest or brightest, 100 and more. * stands out in most episodes: p ≤ 0.05, corrected for the \
            number of cells; pale: does not, single episodes or errors of the engine."
@@ -84,10 +82,8 @@ fn over_time(cells: &[Cell]) -> String {
         let (channel, phase) = (words(found.channel.name()), found.phase.name());
         out += &format!("<tr><th scope=\"row\">{channel}, {phase}</th>");
         for value in found.over_time {
-            out += &value.map_or_else(
-                || "<td class=\"void\">·</td>".into(),
-                |value| cell(value, "", found.p_value > SIGNIFICANT),
-            );
+            out +=
+                &value.map_or_else(|| "<td class=\"void\">·</td>".into(), |value| cell(value, "", !found.stands_out()));
         }
         out += "</tr>";
     }

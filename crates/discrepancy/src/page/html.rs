@@ -65,13 +65,6 @@ pub(super) fn log_evidence(value: f64) -> String {
     }
 }
 
-/// Decimals at which an interval still shows two digits of its half-width.
-pub(super) fn decimals(interval: [f64; 2], value: f64) -> usize {
-    let half = 0.5 * (interval[1] - interval[0]).abs();
-    let size = if half > 0.0 && half.is_finite() { half } else { 0.1 * value.abs() };
-    if size > 0.0 && size.is_finite() { (1 - size.log10().floor() as i32).clamp(0, 8) as usize } else { 2 }
-}
-
 /// A name of the catalogue or of a channel in words.
 pub(super) fn words(name: &str) -> String {
     escape(&name.replace('_', " "))

@@ -112,12 +112,7 @@ fn foot(report: &Report) -> String {
     ];
     let lines: String = lines.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{text}</dd>")).collect();
     let fold = report.fold.map(|[part, parts]| format!(", part {part} of {parts} held out")).unwrap_or_default();
-    let left_out: Vec<String> = report.left_out.iter().map(u64::to_string).collect();
-    let left_out = if left_out.is_empty() {
-        String::new()
-    } else {
-        format!(" Left out, without a pose of the object and a row after it: episodes {}.", left_out.join(", "))
-    };
+    let left_out = report.left_out_sentence().map(|sentence| format!(" {sentence}.")).unwrap_or_default();
     format!(
         "<dl>{lines}</dl><p class=\"soft\">Seed {}{fold}; {} simulated episodes, {} s. Version {} of the contract of report.json.{left_out}</p>",
         report.seed,
