@@ -17,6 +17,7 @@ use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Nominal, Tunable};
 use crate::plausible;
+use crate::replay::worst;
 use crate::report::Verdict;
 use crate::rival::Round;
 use crate::screen::{Screening, places};
@@ -24,6 +25,7 @@ use crate::search::Search;
 use crate::simulator::Simulator;
 use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
+use crate::touch::{ContactGap, contact_gap};
 use crate::trial::{Trial, groups};
 use crate::verdict::{comes_near, verdict};
 
@@ -166,6 +168,8 @@ pub struct Diagnosis {
     pub remaining: Vec<Cell>,
     /// What force on the object the re-tuned nominal model lacks, where the verdict is that nothing in the catalogue explains it.
     pub lacking_force: Option<LackingForce>,
+    /// How its contacts differ from the measured ones, there.
+    pub contact_gap: Option<ContactGap>,
     /// Held-out episodes before and after, for plots.
     pub evidence: Evidence,
     /// Simulated episodes.
@@ -183,7 +187,9 @@ impl Diagnosis {
     fn judge(&mut self, study: &Study, settings: &Settings) {
         (self.verdict, self.reason) = verdict(self, settings);
         if self.verdict == Verdict::Unknown {
-            self.lacking_force = lacking_force(study.simulator, &study.chosen, &self.nominal);
+            let worst = worst(study.simulator, &study.chosen, &self.nominal);
+            self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst);
+            self.contact_gap = contact_gap(&worst);
             if !self.model.model.parts.is_empty() && !comes_near(self) {
                 self.without_effects();
             }
@@ -272,6 +278,7 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         effects_in_model: nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
         tunables: nominal.tunables.clone(),
         lacking_force: None,
+        contact_gap: None,
         rollouts: 0,
         left_out,
         fitted_ids: episodes.fitted.iter().map(|group| trials[chosen[group.start]].id).collect(),

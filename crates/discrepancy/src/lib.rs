@@ -14,7 +14,7 @@
 //!    ([`locate`]), or another one promises enough, the search goes on beside it; where it still does, and much of the gap is open, the verdict is `unknown`. Of what is thrown
 //!    up to four are looked for in a part of the episodes, and fitted to all together.
 //! 6. [`report`]: where ([`locate`]), what, how sure ([`interval`]), before and after, what to record next ([`separate`]).
-//!    Of an unknown gap what the force that is lacking follows ([`terms`]).
+//!    Of an unknown gap what the force that is lacking follows ([`terms`]), and how contacts differ ([`touch`]).
 //!
 //! The same log, seed and version give the same answer, whatever the number of threads.
 //!
@@ -54,6 +54,7 @@ pub mod obstacle;
 mod page;
 mod patch;
 mod plausible;
+mod replay;
 pub mod report;
 pub mod rival;
 pub mod screen;
@@ -62,6 +63,7 @@ pub mod separate;
 pub mod simulator;
 pub mod study;
 pub mod terms;
+pub mod touch;
 pub mod trial;
 mod verdict;
 pub mod whitener;

@@ -10,6 +10,7 @@ use crate::locate::Cell;
 use crate::rival::Rival;
 use crate::separate;
 use crate::terms::LackingForce;
+use crate::touch::ContactGap;
 use crate::verdict::{closed_fraction, heldout_errors};
 
 /// The verdict.
@@ -120,6 +121,8 @@ pub struct Report {
     pub description: Option<String>,
     /// The latter in numbers; `None` where no gap is left, or too little moves to say.
     pub lacking_force: Option<LackingForce>,
+    /// How much of such a gap lies where only one of simulation and measurement has the tool touch the object; `None` without a sensor at the tool, or of few episodes.
+    pub contact_gap: Option<ContactGap>,
     /// Held-out comparison.
     pub heldout: Heldout,
     /// The nominal model, re-tuned.
@@ -181,7 +184,7 @@ impl Report {
         }
         let confusion_set = confusion_set(diagnosis, settings, &effects);
         let summary = summary(verdict, &effects, before, after);
-        let description = unknown.then(|| describe(&diagnosis.remaining, diagnosis.lacking_force.as_ref()));
+        let description = unknown.then(|| describe(diagnosis));
         Self {
             version: 1,
             verdict,
@@ -195,6 +198,7 @@ impl Report {
                 &confusion_set,
                 before,
                 separate::telling(diagnosis, &confusion_set),
+                diagnosis.contact_gap.as_ref().and_then(ContactGap::next_experiment),
             ),
             confusion_set,
             ranking: ranking(diagnosis, count),
@@ -202,6 +206,7 @@ impl Report {
             remaining: diagnosis.remaining.clone(),
             description,
             lacking_force: diagnosis.lacking_force.clone(),
+            contact_gap: diagnosis.contact_gap.clone(),
             heldout: Heldout {
                 before,
                 after,
@@ -354,7 +359,8 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
 /// Cells that a description of what is left names.
 const LARGEST: usize = 3;
 
-fn describe(remaining: &[Cell], lacking: Option<&LackingForce>) -> String {
+fn describe(diagnosis: &Diagnosis) -> String {
+    let remaining = &diagnosis.remaining;
     // The largest shares, and what stands out most: it may have decided.
     let surest = remaining.iter().enumerate().skip(LARGEST).min_by(|a, b| a.1.p_value.total_cmp(&b.1.p_value));
     let surer = |p_value: f64| remaining.iter().take(LARGEST).all(|cell| p_value < cell.p_value);
@@ -369,8 +375,9 @@ fn describe(remaining: &[Cell], lacking: Option<&LackingForce>) -> String {
             )
         })
         .collect();
-    let follows = lacking.map(|lacking| format!("; {}", lacking.sentence())).unwrap_or_default();
-    worst.join("; ") + &follows
+    let follows = diagnosis.lacking_force.iter().map(LackingForce::sentence);
+    let touches = diagnosis.contact_gap.iter().filter_map(ContactGap::sentence);
+    worst.into_iter().chain(follows).chain(touches).collect::<Vec<_>>().join("; ")
 }
 
 #[cfg(test)]

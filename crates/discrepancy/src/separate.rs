@@ -121,7 +121,7 @@ pub(crate) fn telling(diagnosis: &Diagnosis, confusion_set: &[&str]) -> Option<T
 const FAR: f64 = 100.0;
 
 /// What to do next; `named`: whether something was, or the confusion set is but what the evidence leans to. `before`: held-out mean square, re-tuned; `telling`: what
-/// tells the first two apart.
+/// tells the first two apart; `contacts`: what to do about contacts of an unknown gap that begin apart.
 #[must_use]
 pub fn next_experiment(
     verdict: Verdict,
@@ -129,6 +129,7 @@ pub fn next_experiment(
     confusion_set: &[&str],
     before: f64,
     telling: Option<Telling>,
+    contacts: Option<&str>,
 ) -> String {
     if verdict == Verdict::Unknown && before > FAR {
         return format!(
@@ -153,10 +154,9 @@ pub fn next_experiment(
         (Verdict::None, names) => {
             format!("None needed; {DESIGNED} would show whether there is a weak {}.", names.join(" or "))
         }
-        (Verdict::Unknown, _) => {
-            "Repeat the worst episodes with one thing changed at a time: place, direction, speed, added weight, time."
-                .into()
-        }
+        (Verdict::Unknown, _) => contacts
+            .unwrap_or("Repeat the worst episodes with one thing changed at a time: place, direction, speed, added weight, time.")
+            .into(),
         (Verdict::Effect, [_]) => "None needed to name it; more episodes narrow the intervals.".into(),
         (Verdict::Effect, names) => format!("{}: {DESIGNED}.{like}", names.join(" or ")),
     }
@@ -170,16 +170,21 @@ mod tests {
     fn a_pair_is_told_apart_only_if_one_of_it_is_named() {
         let pair = ["mass_leak", "force_drift"];
         assert!(
-            next_experiment(Verdict::Effect, true, &pair, 3.0, None).starts_with("mass_leak or force_drift: weigh")
+            next_experiment(Verdict::Effect, true, &pair, 3.0, None, None)
+                .starts_with("mass_leak or force_drift: weigh")
         );
-        assert!(next_experiment(Verdict::Unknown, true, &pair, 3.0, None).contains("weigh"));
-        assert!(next_experiment(Verdict::Unknown, true, &pair, 300.0, None).contains("another unit"));
+        assert!(next_experiment(Verdict::Unknown, true, &pair, 3.0, None, None).contains("weigh"));
+        assert!(next_experiment(Verdict::Unknown, true, &pair, 300.0, None, None).contains("another unit"));
         let telling = Some(Telling { episode: 7, ln_odds: 2.34 });
         assert!(
-            next_experiment(Verdict::Effect, true, &pair, 3.0, telling).contains("episode 7 says most of it (+2.3 of")
+            next_experiment(Verdict::Effect, true, &pair, 3.0, telling, None)
+                .contains("episode 7 says most of it (+2.3 of")
         );
-        assert!(next_experiment(Verdict::Unknown, false, &pair, 3.0, None).starts_with("Repeat"));
-        assert!(next_experiment(Verdict::None, false, &pair, 3.0, None).ends_with("a weak mass_leak or force_drift."));
-        assert!(next_experiment(Verdict::None, false, &[], 3.0, None).ends_with("smaller effects."));
+        assert!(next_experiment(Verdict::Unknown, false, &pair, 3.0, None, None).starts_with("Repeat"));
+        assert!(next_experiment(Verdict::Unknown, false, &pair, 3.0, None, Some("Knock.")).starts_with("Knock"));
+        assert!(
+            next_experiment(Verdict::None, false, &pair, 3.0, None, None).ends_with("a weak mass_leak or force_drift.")
+        );
+        assert!(next_experiment(Verdict::None, false, &[], 3.0, None, None).ends_with("smaller effects."));
     }
 }

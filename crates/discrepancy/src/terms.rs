@@ -9,16 +9,14 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
 use crate::fit::Fit;
-use crate::likelihood::mean_square;
-use crate::simulator::{Nudge, Simulator};
-use crate::trial::{Window, groups};
+use crate::replay::Replay;
+use crate::simulator::Simulator;
+use crate::trial::Window;
 
 mod library;
 
 use library::{BEYOND, Middle, Term};
 
-/// Episodes that are simulated for it, the worst explained ones.
-const EPISODES: usize = 20;
 /// Terms, at most, beside another friction.
 const TERMS: usize = 3;
 /// Parts that are left out in turn.
@@ -287,29 +285,22 @@ fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
     })
 }
 
-/// What force a fit lacks in the episodes, or pieces of them, that it was fitted to; `None` where too little moves to say.
-pub(crate) fn lacking_force(simulator: &Simulator, chosen: &[usize], fit: &Fit) -> Option<LackingForce> {
+/// What force a fit lacks in replayed episodes; `None` where too little moves to say.
+pub(crate) fn lacking_force(simulator: &Simulator, fit: &Fit, episodes: &[Vec<Replay>]) -> Option<LackingForce> {
     let nominal = simulator.nominal;
     let hypothesis = fit.model.hypothesis(&fit.x);
     let engine = nominal.engine();
-    let mut groups = groups(chosen.iter().map(|index| &simulator.trials[*index]));
-    let error = |group: &std::ops::Range<usize>| mean_square(&fit.residuals[group.clone()]);
-    groups.sort_by(|a, b| error(b).total_cmp(&error(a)));
-    groups.truncate(EPISODES);
-    groups.sort_by_key(|group| group.start);
     let (rolls, gravity_mps2) = (nominal.rolls(), nominal.header().gravity_mps2);
-    let windows = |index: &usize| {
-        let trial = &simulator.trials[*index];
-        let (start, readings) = simulator.readings(&hypothesis, &engine, Nudge::default(), trial);
-        let phases = trial.phases(&readings, rolls, gravity_mps2);
+    let windows = |replay: &Replay| {
+        let Replay { trial, start, readings } = replay;
+        let phases = trial.phases(readings, rolls, gravity_mps2);
         let object = nominal.object(&hypothesis.z, trial.added_mass_kg, &engine);
         let mass_kg = object.mass_kg + object.added_mass_kg;
         let slides = nominal.has_tool() && !rolls;
         let friction_n = if slides { object.friction * mass_kg * gravity_mps2 } else { 0.0 };
-        trial.windows(&start, &readings, &phases, mass_kg, friction_n)
+        trial.windows(start, readings, &phases, mass_kg, friction_n)
     };
-    let episodes: Vec<Vec<Window>> =
-        groups.into_iter().map(|group| chosen[group].iter().flat_map(windows).collect()).collect();
+    let episodes: Vec<Vec<Window>> = episodes.iter().map(|pieces| pieces.iter().flat_map(windows).collect()).collect();
     describe(&episodes, if nominal.has_tool() { 2 } else { 3 })
 }
 

@@ -11,6 +11,7 @@ mod phase;
 mod series;
 mod shots;
 mod start;
+mod touch;
 mod windows;
 
 use std::ops::Range;
@@ -26,6 +27,7 @@ use crate::noise::NoiseLevels;
 pub use kind::Kind;
 pub use phase::Phase;
 pub use series::Compared;
+pub(crate) use touch::Touch;
 pub(crate) use windows::Window;
 
 /// Blocks of a channel in an episode, about.

@@ -126,6 +126,23 @@ fn what_the_catalogue_does_not_have_is_called_unknown() {
 }
 
 #[test]
+fn a_tool_of_another_size_than_the_log_says_is_told_by_when_it_touches() {
+    // In MuJoCo it is a ball of 20 mm.
+    let mut log = measured_log::read(&logs().join("set-002")).unwrap();
+    log.header.tool_radius_m = Some(0.014);
+    let (found, _) = of(&log, "set-002", None);
+    assert_eq!(found.verdict, Verdict::Unknown, "{}", found.summary);
+    let onset = found.contact_gap.unwrap().onset.unwrap();
+    assert!((onset.after_m[1] + 0.006).abs() < 0.001, "{onset:?}");
+    let description = found.description.unwrap();
+    assert!(
+        description.contains("before simulated ones") && description.contains("the sizes of tool"),
+        "{description}"
+    );
+    assert!(found.next_experiment.starts_with("Measure tool and object"), "{}", found.next_experiment);
+}
+
+#[test]
 fn what_is_in_the_way_is_named() {
     let (found, _) = report("set-006", None);
     assert_eq!(found.verdict, Verdict::Effect, "{}", found.summary);

@@ -88,6 +88,7 @@ fn report(verdict: Verdict) -> Report {
                 coefficients: vec![Coefficient { key: "strength", unit: "N m²", value: 0.000_853 }],
             }],
         }),
+        contact_gap: None,
         heldout: Heldout {
             before: 9.1,
             after: if named { 1.04 } else { 9.1 },

@@ -208,7 +208,12 @@ fn touched(rows: &[Row], sigma: f64) -> Option<bool> {
     let (count, sum) = read.fold((0.0, [0.0; 3]), |(count, sum): (f64, [f64; 3]), (less, simulated)| {
         (count + 1.0, std::array::from_fn(|i| sum[i] + less[i] + simulated[i]))
     });
-    (count > 0.0).then(|| norm(sum) / count > TOUCH_N.max(TOUCH_SIGMAS * sigma / count.sqrt()))
+    (count > 0.0).then(|| norm(sum) / count > least_force(sigma, count))
+}
+
+/// What the mean of so many readings has to be beyond to be a touch, N.
+pub(super) fn least_force(sigma: f64, count: f64) -> f64 {
+    TOUCH_N.max(TOUCH_SIGMAS * sigma / count.sqrt())
 }
 
 fn mean(rows: &[Row], pick: fn(&Row) -> [f64; 3]) -> [f64; 3] {
