@@ -96,7 +96,10 @@ impl Unknown {
             4 => Self::StripedTable { amplitude: between(0.3, 0.7), width_m: rng.random_range(0.06..0.1) },
             5 => Self::FrictionOverTime { rate_ps: between(0.1, 0.4) },
             6 => Self::ForceCrosstalk { share: between(0.15, 0.4), gain: 1.0 + between(0.1, 0.3) },
-            7 => Self::ToolRadius { radius_m: if angle > 3.0 { between(0.024, 0.03) } else { between(0.016, 0.012) } },
+            // Its middle is 25 mm above the table: a larger one would press on that.
+            7 => {
+                Self::ToolRadius { radius_m: if angle > 3.0 { between(0.0225, 0.0245) } else { between(0.016, 0.012) } }
+            }
             _ => panic!("no kind {kind}"),
         }
     }
@@ -211,5 +214,21 @@ impl ForceFilter for Crosstalk {
     fn apply(&mut self, _moment: &ToolMoment, wrench: &mut Wrench) {
         wrench.force_n[2] += self.share * wrench.force_n[0];
         wrench.force_n[0] *= self.gain;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use pomdp::{Purpose, Seed};
+
+    use super::*;
+
+    #[test]
+    fn every_tool_moves_above_the_table() {
+        let mut rng = Seed(1).stream(Purpose::World, 0);
+        for strength in (0..300).map(|i| i % 3) {
+            let Unknown::ToolRadius { radius_m } = Unknown::draw(7, strength, &mut rng) else { panic!("another kind") };
+            assert!((0.01..0.0249).contains(&radius_m) && (radius_m - 0.02).abs() > 0.002, "{radius_m}");
+        }
     }
 }
