@@ -1,6 +1,6 @@
 //! How much of a gap lies where only one of simulation and measurement has the tool touch the object, and by how much their contacts begin apart.
 //!
-//! A tool or object of another size than the log says, an object that starts elsewhere, and clocks of force and pose that differ make no force that follows motion or place
+//! A tool or object of another size than the log says, a tool or object that is tracked elsewhere, and clocks of force and pose that differ make no force that follows motion or place
 //! ([`crate::terms`]): the wrist feels a whole contact too early or too late. A size shows as the same way of the tool in each episode, a clock as the same time.
 
 use serde::Serialize;
@@ -13,6 +13,8 @@ use crate::trial::Touch;
 const TOLD: f64 = 0.25;
 /// Way or time is what is alike if its middle half, as a share of the median, is as narrow beside the other's.
 const CLEARLY: f64 = 0.5;
+/// Contacts begin at readings; a median of fewer than so many of them is none.
+const LEAST_READINGS: f64 = 2.0;
 /// Episodes that say anything.
 const LEAST: usize = 6;
 
@@ -47,25 +49,30 @@ pub struct Onset {
     pub after_secs: [f64; 3],
     /// The tool's way in that time, m, with the same sign.
     pub after_m: [f64; 3],
+    /// Time between two readings, s: their median.
+    pub reading_secs: f64,
 }
 
 impl ContactGap {
-    /// How contacts begin apart, if that is much of what is left: three quarters of the episodes to the same side. The few readings of an impact may hold much of a square, too, a
-    /// tick earlier or later.
-    fn told(&self) -> Option<Onset> {
-        let much = self.only_simulated.square + self.only_measured.square > TOLD;
-        self.onset.filter(|onset| much && onset.after_secs[0] * onset.after_secs[2] > 0.0)
+    /// How contacts begin apart, if that is much of what is left, and where: three quarters of the episodes to the same side. The few readings of an impact may hold much of a square,
+    /// too, a reading earlier or later.
+    fn told(&self) -> Option<(Onset, Part)> {
+        let onset = self.onset?;
+        let [low, middle, high] = onset.after_secs;
+        let part = if middle > 0.0 { self.only_simulated } else { self.only_measured };
+        let apart = low * high > 0.0 && middle.abs() > (LEAST_READINGS - 0.5) * onset.reading_secs;
+        (apart && part.square > TOLD).then_some((onset, part))
     }
 
     /// What to do about it; `None` where it is little of what is left.
     pub(crate) fn next_experiment(&self) -> Option<&'static str> {
-        Some(match self.told()?.alike() {
+        Some(match self.told()?.0.alike() {
             Alike::Way => {
-                "Measure tool and object, and touch the object from two opposite sides: a wrong size shows alike on both, a wrong start on one as late as early on the other."
+                "Measure tool and object, and touch the object from two opposite sides: a wrong size shows alike on both, a wrong place on one as late as early on the other."
             }
             Alike::Time => "Knock on the object: its poses and the force show by how much their clocks differ.",
             Alike::Both => {
-                "Touch the object from two sides at two speeds: contacts that begin apart by the same way of the tool are a matter of sizes or of where the object starts, by the \
+                "Touch the object from two sides at two speeds: contacts that begin apart by the same way of the tool are a matter of sizes or places, by the \
                  same time one of clocks."
             }
         })
@@ -73,28 +80,25 @@ impl ContactGap {
 
     /// In words; `None` where it is little of what is left.
     pub(crate) fn sentence(&self) -> Option<String> {
-        let onset = self.told()?;
+        let (onset, part) = self.told()?;
         let ([_, secs, _], [_, way_m, _]) = (onset.after_secs, onset.after_m);
-        let (part, only, other) = if self.only_simulated.square > self.only_measured.square {
-            (self.only_simulated, "simulated", "measured")
-        } else {
-            (self.only_measured, "measured", "simulated")
-        };
+        let [only, other, when] =
+            if secs > 0.0 { ["simulated", "measured", "after"] } else { ["measured", "simulated", "before"] };
+        let readings = 100.0 * part.readings;
+        let readings = if readings < 1.0 { "less than 1".into() } else { format!("{readings:.0}") };
         Some(format!(
-            "{:.0} % of the square of what the wrist feels otherwise lies in {:.0} % of its readings, where the {only} tool touches the object and the {other} one does not: \
-             measured contacts begin {:.2} s or {:.1} mm of the tool's way {} simulated ones (medians of {} episodes{})",
+            "{:.0} % of the square of what the wrist feels otherwise lies in {readings} % of its readings, where the {only} tool touches the object and the {other} one does not: \
+             measured contacts begin {:.0} ms or {:.1} mm of the tool's way {when} simulated ones (medians of {} episodes{})",
             100.0 * part.square,
-            100.0 * part.readings,
-            secs.abs(),
+            1e3 * secs.abs(),
             1e3 * way_m.abs(),
-            if secs > 0.0 { "after" } else { "before" },
             onset.episodes,
             match onset.alike() {
                 Alike::Way =>
-                    "; the way is about the same in each: look at the sizes of tool and object, and where the object starts",
+                    "; the way is about the same in each: look at the sizes of tool and object, and at where both are tracked",
                 Alike::Time => "; the time is about the same in each: look at the clocks of force and pose",
                 Alike::Both =>
-                    "; look at the sizes of tool and object, where the object starts, and the clocks of force and pose",
+                    "; look at the sizes of tool and object, at where both are tracked, and at the clocks of force and pose",
             }
         ))
     }
@@ -112,9 +116,11 @@ enum Alike {
 impl Onset {
     fn alike(&self) -> Alike {
         let [way, time] = [self.after_m, self.after_secs].map(|[low, middle, high]| ((high - low) / middle).abs());
-        if way < CLEARLY * time {
+        // What is told apart by less than a reading is not.
+        let reading = (self.reading_secs / self.after_secs[1]).abs();
+        if way + reading < CLEARLY * time {
             Alike::Way
-        } else if time < CLEARLY * way {
+        } else if time + reading < CLEARLY * way {
             Alike::Time
         } else {
             Alike::Both
@@ -157,16 +163,24 @@ fn onset(episodes: &[Vec<Touch>]) -> Option<Onset> {
         let mut values = Data::new(after.iter().map(|both| both[of]).collect::<Vec<f64>>());
         [0.25, 0.5, 0.75].map(|share| values.quantile(share))
     };
-    (after.len() >= LEAST).then(|| Onset { episodes: after.len(), after_secs: quarters(0), after_m: quarters(1) })
+    let steps = episodes.iter().flat_map(|rows| rows.windows(2).map(|two| two[1].time_secs - two[0].time_secs));
+    let reading_secs = Data::new(steps.collect::<Vec<f64>>()).median();
+    (after.len() >= LEAST).then(|| Onset {
+        episodes: after.len(),
+        after_secs: quarters(0),
+        after_m: quarters(1),
+        reading_secs,
+    })
 }
 
-/// Time and way of the tool between the first contacts of an episode. A contact lasts two readings at least; one that an episode begins with has begun at no known time.
+/// Time and way of the tool between the first contacts of an episode. A contact lasts two readings at least; one that an episode begins with has begun at no known time, and at
+/// its start nothing is simulated to touch.
 fn after(rows: &[Touch]) -> Option<[f64; 2]> {
     let first = |touches: fn(&Touch) -> bool| {
         (1..rows.len())
             .find(|row| touches(&rows[row - 1]) && touches(&rows[*row]))
             .map(|row| row - 1)
-            .filter(|row| *row > 0)
+            .filter(|row| *row > 1)
     };
     let (simulated, measured) = (first(|touch| touch.simulated)?, first(|touch| touch.measured)?);
     let (from, to) = (simulated.min(measured), simulated.max(measured));
@@ -232,6 +246,9 @@ mod tests {
     fn of_contacts_at_the_same_time_and_of_few_episodes_nothing_is_told() {
         let same = of_touches(&SPEEDS.map(|speed| push(speed, 0.0, 0.0))).unwrap();
         assert!(same.sentence().is_none() && same.onset.unwrap().after_secs == [0.0; 3], "{same:?}");
+        // A reading later is an engine's way to touch, and as much of it as there is.
+        let reading = of_touches(&SPEEDS.map(|speed| push(speed, 0.0, 0.01))).unwrap();
+        assert!(reading.sentence().is_none() && reading.only_simulated.square > 0.5, "{reading:?}");
         assert!(of_touches(&SPEEDS[..5].iter().map(|speed| push(*speed, 0.004, 0.0)).collect::<Vec<_>>()).is_none());
         // A push that begins in touch, as measured, says nothing of when.
         let mut held = push(0.05, 0.004, 0.0);
