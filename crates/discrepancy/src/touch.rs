@@ -13,8 +13,8 @@ use crate::trial::Touch;
 const TOLD: f64 = 0.25;
 /// Way or time is what is alike if its middle half, as a share of the median, is as narrow beside the other's.
 const CLEARLY: f64 = 0.5;
-/// Contacts begin at readings; a median of fewer than so many of them is none.
-const LEAST_READINGS: f64 = 2.0;
+/// Contacts begin at readings; a median of so many of them, which is of one, says nothing.
+const READINGS: f64 = 1.5;
 /// Episodes that say anything.
 const LEAST: usize = 6;
 
@@ -60,7 +60,7 @@ impl ContactGap {
         let onset = self.onset?;
         let [low, middle, high] = onset.after_secs;
         let part = if middle > 0.0 { self.only_simulated } else { self.only_measured };
-        let apart = low * high > 0.0 && middle.abs() > (LEAST_READINGS - 0.5) * onset.reading_secs;
+        let apart = low * high > 0.0 && middle.abs() > READINGS * onset.reading_secs;
         (apart && part.square > TOLD).then_some((onset, part))
     }
 
