@@ -86,5 +86,5 @@ pub(crate) fn cargo(root: &Path) -> Command {
 /// The workspace that this program was built in.
 pub(crate) fn root() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
-    package.ancestors().nth(2).unwrap_or(package).to_path_buf()
+    package.parent().unwrap_or(package).to_path_buf()
 }
