@@ -1,7 +1,4 @@
-//! Settings of the rejection filter. Every key is required: a scenario states what it runs.
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+//! Settings of the rejection filter.
 
 use crate::Error;
 
@@ -10,10 +7,36 @@ pub(crate) const MOST_PARTICLES: usize = 1_000_000;
 pub(crate) const MOST_ATTEMPTS: usize = 100_000_000;
 
 /// Settings of [`crate::RejectionFilter`].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "RejectionConfig")]
-pub struct Config {
+///
+/// Start from [`RejectionConfig::default`] and change what your problem needs. [`crate::RejectionFilter::new`] checks every value. With the
+/// feature `serde` a file of settings has to name every key: a missing key is an error and does not fall back to the default.
+///
+/// # Defaults
+///
+/// | field | default | why |
+/// |---|---|---|
+/// | `particles` | 1000 | A probability of one half then has a standard error of 1.6 %. |
+/// | `max_attempts` | 20,000 | The belief stays full down to an acceptance of one attempt in 15. |
+/// | `noise_share` | 0.25 | Most attempts draw from the belief itself; noise adds variety only where these run out. |
+/// | `proposal_share` | 0.5 | Proposals can be wrong, so at least half of the belief comes from simulation. |
+///
+/// # Example
+///
+/// ```
+/// use belief::RejectionConfig;
+/// let config = RejectionConfig::default().with_particles(500).with_proposals(0.0);
+/// assert_eq!(config.validate(), Ok(()));
+/// assert_eq!(
+///     config.with_particles(0).validate().unwrap_err().to_string(),
+///     "belief: `particles` is 0, but must be at least 1"
+/// );
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "schemars", schemars(description = "Settings of `RejectionFilter`."))]
+pub struct RejectionConfig {
     /// Particles of a belief: N.
     pub particles: usize,
     /// Most transitions that one update may simulate.
@@ -25,7 +48,42 @@ pub struct Config {
     pub proposal_share: f64,
 }
 
-impl Config {
+impl Default for RejectionConfig {
+    /// The values of the table above.
+    fn default() -> Self {
+        Self { particles: 1000, max_attempts: 20_000, noise_share: 0.25, proposal_share: 0.5 }
+    }
+}
+
+/// The same settings with one of them changed. Values are checked by [`RejectionConfig::validate`], which
+/// [`crate::RejectionFilter::new`] calls.
+impl RejectionConfig {
+    /// Particles of a belief. At least 1.
+    #[must_use]
+    pub fn with_particles(self, particles: usize) -> Self {
+        Self { particles, ..self }
+    }
+
+    /// Most transitions that one update may simulate. At least as many as there are particles.
+    #[must_use]
+    pub fn with_max_attempts(self, max_attempts: usize) -> Self {
+        Self { max_attempts, ..self }
+    }
+
+    /// Share of the attempts that is kept for particles moved by noise, in [0, 1). 0 switches noise off.
+    #[must_use]
+    pub fn with_noise(self, noise_share: f64) -> Self {
+        Self { noise_share, ..self }
+    }
+
+    /// Largest share of a belief that comes from outside proposals, in [0, 1). 0 ignores them.
+    #[must_use]
+    pub fn with_proposals(self, proposal_share: f64) -> Self {
+        Self { proposal_share, ..self }
+    }
+}
+
+impl RejectionConfig {
     /// Checks every value against its limits.
     ///
     /// # Errors
@@ -77,28 +135,30 @@ mod tests {
         proposal_share = 0.3
     ";
 
-    fn config() -> Config {
+    fn config() -> RejectionConfig {
         toml::from_str(TEXT).unwrap()
     }
 
     #[test]
     fn a_scenario_file_sets_every_key() {
-        let expected = Config { particles: 1000, max_attempts: 20_000, noise_share: 0.25, proposal_share: 0.3 };
+        let expected =
+            RejectionConfig { particles: 1000, max_attempts: 20_000, noise_share: 0.25, proposal_share: 0.3 };
         assert_eq!(config(), expected);
-        assert_eq!(toml::from_str::<Config>(&toml::to_string(&expected).unwrap()).unwrap(), expected);
+        assert_eq!(toml::from_str::<RejectionConfig>(&toml::to_string(&expected).unwrap()).unwrap(), expected);
     }
 
     #[test]
     fn a_misspelt_or_missing_key_is_named() {
-        let misspelt = toml::from_str::<Config>(&format!("{TEXT}\nparticle = 3")).unwrap_err().to_string();
+        let misspelt = toml::from_str::<RejectionConfig>(&format!("{TEXT}\nparticle = 3")).unwrap_err().to_string();
         assert!(misspelt.contains("unknown field `particle`"), "{misspelt}");
-        let missing = toml::from_str::<Config>(&TEXT.replace("noise_share = 0.25", "")).unwrap_err().to_string();
+        let missing =
+            toml::from_str::<RejectionConfig>(&TEXT.replace("noise_share = 0.25", "")).unwrap_err().to_string();
         assert!(missing.contains("missing field `noise_share`"), "{missing}");
     }
 
     #[test]
     fn values_outside_their_limits_name_key_value_and_limit() {
-        let message = |change: fn(&mut Config)| {
+        let message = |change: fn(&mut RejectionConfig)| {
             let mut config = config();
             change(&mut config);
             config.validate().unwrap_err().to_string()
@@ -117,10 +177,20 @@ mod tests {
     }
 
     #[test]
+    fn defaults_are_valid_and_each_builder_changes_its_own_field() {
+        let d = RejectionConfig::default;
+        assert_eq!(d().validate(), Ok(()));
+        assert_eq!(d().with_particles(7), RejectionConfig { particles: 7, ..d() });
+        assert_eq!(d().with_max_attempts(7), RejectionConfig { max_attempts: 7, ..d() });
+        assert_eq!(d().with_noise(0.1), RejectionConfig { noise_share: 0.1, ..d() });
+        assert_eq!(d().with_proposals(0.1), RejectionConfig { proposal_share: 0.1, ..d() });
+    }
+
+    #[test]
     fn shares_leave_an_attempt_and_a_place_to_plain_simulation() {
         assert_eq!((config().plain_attempts(), config().proposal_places()), (15_000, 300));
         let most = 1.0 - f64::EPSILON / 2.0;
-        let extreme = Config { particles: 10, max_attempts: 10, noise_share: most, proposal_share: most };
+        let extreme = RejectionConfig { particles: 10, max_attempts: 10, noise_share: most, proposal_share: most };
         assert_eq!(extreme.validate(), Ok(()));
         assert_eq!((extreme.plain_attempts(), extreme.proposal_places()), (1, 9));
     }

@@ -48,7 +48,7 @@ pub enum Error {
     /// A configured value lies outside its limits.
     #[error("belief: `{key}` is {value}, but must be {limit}")]
     Config {
-        /// Key as written in the scenario file.
+        /// Field of the configuration.
         key: &'static str,
         /// Offending value.
         value: String,

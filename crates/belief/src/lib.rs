@@ -1,57 +1,9 @@
-//! Particle filters over (s, Θ).
+#![doc = include_str!("../README.md")]
 //!
-//! [`Particles`] is the belief; [`RejectionFilter`] is the update of the `paper` preset: simulate particles and keep those whose
-//! observation falls into the class of the real one (Silver and Veness 2010), reinvigorate with artificial noise where they run
-//! out, and take in particles suggested from outside. [`WeightedFilter`] is that of the `surmise` preset: likelihood weights on continuous
-//! observations, tempering, smoothed static parameters and quotas per structure, proposals with importance weights, restarts. Depletion is
-//! a typed error, never an empty belief.
+//! # API boundary
 //!
-//! # Example
-//!
-//! A coin that is either fair or always shows heads; tossing it tells them apart.
-//!
-//! ```
-//! use belief::{Config, Particles, RejectionFilter};
-//! use pomdp::{Discretise, GenerativeModel, Outcome, Perturb, Proposals, Purpose, Rng, Seed, Step, Updater};
-//! use rand::RngExt as _;
-//!
-//! struct Coin;
-//!
-//! /// Probability of heads: what is unknown.
-//! type Heads = f64;
-//!
-//! impl GenerativeModel for Coin {
-//!     type State = Heads;
-//!     type Action = ();
-//!     type Observation = bool;
-//!     fn actions(&self) -> &[()] { &[()] }
-//!     fn step(&self, heads: &mut Heads, _toss: &(), rng: &mut Rng) -> Step<bool> {
-//!         Step { observation: rng.random_bool(*heads), reward: 0.0, outcome: Outcome::Continue }
-//!     }
-//!     fn discount(&self) -> f64 { 1.0 }
-//! }
-//!
-//! impl Discretise for Coin {
-//!     type Key = bool;
-//!     fn key(&self, observation: &bool) -> bool { *observation }
-//! }
-//!
-//! impl Perturb for Coin {
-//!     fn perturb(&self, heads: &mut Heads, rng: &mut Rng) {
-//!         *heads = (*heads + rng.random_range(-0.01..0.01)).clamp(0.0, 1.0);
-//!     }
-//! }
-//!
-//! let mut filter = RejectionFilter::new(Config { particles: 1000, max_attempts: 10_000, noise_share: 0.2, proposal_share: 0.1 })?;
-//! let belief = Particles::uniform(vec![0.5, 1.0])?;
-//! let mut rng = Seed(1).stream(Purpose::Filter, 0);
-//!
-//! let (belief, report) = filter.update(&Coin, belief, &(), &true, Proposals::none(), &mut rng)?;
-//! let biased = belief.states().iter().filter(|&&heads| heads == 1.0).count();
-//! assert!((biased as f64 / 1000.0 - 2.0 / 3.0).abs() < 0.06); // Bayes: 1 / (1 + 1/2)
-//! assert!((report.log_evidence - 0.75_f64.ln()).abs() < 0.06);
-//! # Ok::<(), belief::Error>(())
-//! ```
+//! Everything that is re-exported here; there are no public modules. The crate is made to be published: breaking changes follow semantic
+//! versioning. The belief that a seed leads to may change with any version.
 //!
 //! # Which test sees which fault
 //!
@@ -85,7 +37,7 @@ mod rejection;
 mod resample;
 mod weighted;
 
-pub use config::Config;
+pub use config::RejectionConfig;
 pub use diagnostics::effective_sample_size;
 pub use error::Error;
 pub use particles::Particles;

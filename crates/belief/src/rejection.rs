@@ -3,7 +3,7 @@
 use pomdp::{Belief as _, Discretise, Outcome, Perturb, Proposals, Rng, UpdateReport, Updater};
 
 use crate::reinvigorate::{copies, perturbed};
-use crate::{Config, Error, Particles};
+use crate::{Error, Particles, RejectionConfig};
 
 /// Unweighted particle filter that keeps what agrees with the class of the observation.
 ///
@@ -25,7 +25,7 @@ use crate::{Config, Error, Particles};
 /// is that of both phases. The density of proposals is not used. Every attempt is one transition on one clone of a state.
 #[derive(Clone, Debug)]
 pub struct RejectionFilter {
-    config: Config,
+    config: RejectionConfig,
 }
 
 impl RejectionFilter {
@@ -34,14 +34,14 @@ impl RejectionFilter {
     /// # Errors
     ///
     /// [`Error::Config`] where a value lies outside its limits.
-    pub fn new(config: Config) -> Result<Self, Error> {
+    pub fn new(config: RejectionConfig) -> Result<Self, Error> {
         config.validate()?;
         Ok(Self { config })
     }
 
     /// Its settings.
     #[must_use]
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &RejectionConfig {
         &self.config
     }
 }
@@ -59,7 +59,7 @@ impl<M: Discretise + Perturb> Updater<M> for RejectionFilter {
         proposals: Proposals<'_, M::State>,
         rng: &mut Rng,
     ) -> Result<(Self::Belief, UpdateReport), Error> {
-        let Config { particles, max_attempts, .. } = self.config;
+        let RejectionConfig { particles, max_attempts, .. } = self.config;
         let proposals = proposals.states;
         let places = self.config.proposal_places();
         let proposed = proposals.len().min(places);
@@ -98,6 +98,7 @@ impl<M: Discretise + Perturb> Updater<M> for RejectionFilter {
         } else {
             return Err(Error::Depleted { attempts, diverged, terminal });
         };
+        #[cfg(feature = "tracing")]
         tracing::debug!(?report, terminal, plain, "update");
         Ok((Particles::uniform(states)?, report))
     }

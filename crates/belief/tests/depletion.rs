@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use belief::{Config, Error, Particles, RejectionFilter};
+use belief::{Error, Particles, RejectionConfig, RejectionFilter};
 use pomdp::{
     Discretise, GenerativeModel, Outcome, Perturb, Proposals, Purpose, Rng, Seed, Step, UpdateReport, Updater,
     conformance,
@@ -61,7 +61,7 @@ impl Perturb for Line {
 }
 
 fn update(
-    config: Config,
+    config: RejectionConfig,
     model: &Line,
     belief: Vec<f64>,
     (action, observation): (f64, f64),
@@ -80,8 +80,8 @@ fn update(
     Ok((belief.into_states(), report))
 }
 
-fn config(noise_share: f64, proposal_share: f64) -> Config {
-    Config { particles: 100, max_attempts: 5000, noise_share, proposal_share }
+fn config(noise_share: f64, proposal_share: f64) -> RejectionConfig {
+    RejectionConfig { particles: 100, max_attempts: 5000, noise_share, proposal_share }
 }
 
 #[test]
@@ -190,7 +190,7 @@ proptest! {
         proposed in 0_usize..50,
     ) {
         let model = line();
-        let config = Config { particles, max_attempts: particles + more, noise_share, proposal_share };
+        let config = RejectionConfig { particles, max_attempts: particles + more, noise_share, proposal_share };
         let proposals = vec![observation; proposed];
         match update(config, &model, belief, (1.0, observation), &proposals) {
             Ok((states, report)) => {

@@ -1,6 +1,6 @@
 //! The rejection filter against the exact posterior of a hidden Markov model.
 
-use belief::{Config, Particles, RejectionFilter};
+use belief::{Particles, RejectionConfig, RejectionFilter};
 use pomdp::{Discretise, GenerativeModel, Outcome, Perturb, Proposals, Purpose, Rng, Seed, Step, Updater, conformance};
 use rand::RngExt as _;
 
@@ -77,8 +77,13 @@ fn counts(belief: &Particles<usize>) -> [f64; STATES] {
 }
 
 fn filter(particles: usize) -> RejectionFilter {
-    RejectionFilter::new(Config { particles, max_attempts: 100 * particles, noise_share: 0.5, proposal_share: 0.5 })
-        .unwrap()
+    RejectionFilter::new(RejectionConfig {
+        particles,
+        max_attempts: 100 * particles,
+        noise_share: 0.5,
+        proposal_share: 0.5,
+    })
+    .unwrap()
 }
 
 #[test]

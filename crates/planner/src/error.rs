@@ -7,7 +7,7 @@ pub enum Error {
     /// A configured value lies outside its limits.
     #[error("planner: `{key}` is {value}, but must be {limit}")]
     Config {
-        /// Key as written in the scenario file.
+        /// Field of [`crate::Config`], with dots between nested keys.
         key: &'static str,
         /// Offending value.
         value: String,

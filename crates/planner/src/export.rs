@@ -2,8 +2,6 @@
 
 use std::fmt::Write as _;
 
-use serde::{Deserialize, Serialize};
-
 use crate::branching::Export;
 use crate::nodes::NodeId;
 
@@ -17,7 +15,8 @@ pub struct ExportLimit {
 }
 
 /// A history with its actions.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TreeNode {
     /// N(h): visits of all actions, initial ones included.
     pub visits: u64,
@@ -26,7 +25,8 @@ pub struct TreeNode {
 }
 
 /// An action at a history.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TreeAction {
     /// Its debug format.
     pub action: String,
@@ -39,7 +39,8 @@ pub struct TreeAction {
 }
 
 /// What followed an observation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TreeBranch {
     /// Debug format of its class; a number in a widened tree.
     pub observation: String,

@@ -1,75 +1,9 @@
-//! Online planning under partial observability: POMCP (Silver and Veness, "Monte-Carlo planning in large POMDPs", NIPS 2010) and
-//! POMCPOW (Sunberg and Kochenderfer, "Online algorithms for POMDPs with continuous state, action, and observation spaces", ICAPS 2018).
+#![doc = include_str!("../README.md")]
 //!
-//! [`Pomcp`] searches from any [`pomdp::Belief`], with any [`pomdp::Policy`] as rollout policy, and keeps its trees between
-//! decisions. It holds no particles: the belief is filtered elsewhere, so a search sees only what can be sampled. [`Pomcpow`] does the
-//! same for observations that are too many to branch on. A policy may also tell which actions are legal or preferred and what a
-//! state is worth where a rollout is cut. [`SearchReport`] says what was found and what it cost; [`Planner::tree`] shows why.
+//! # API boundary
 //!
-//! # Example
-//!
-//! Tiger: listen for −1, open a door for +10 or, where the tiger is, −100.
-//!
-//! ```
-//! use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, Pomcp, RolloutDepth};
-//! use pomdp::{Belief, Discretise, GenerativeModel, Outcome, Purpose, Rng, Seed, Step, UniformPolicy};
-//! use rand::RngExt as _;
-//!
-//! #[derive(Clone, PartialEq, Debug)]
-//! enum Action { Listen, Open(usize) }
-//!
-//! struct Tiger([Action; 3]);
-//!
-//! impl GenerativeModel for Tiger {
-//!     type State = usize; // the tiger's door
-//!     type Action = Action;
-//!     type Observation = usize; // the door that it is heard from
-//!     fn actions(&self) -> &[Action] { &self.0 }
-//!     fn step(&self, tiger: &mut usize, action: &Action, rng: &mut Rng) -> Step<usize> {
-//!         let heard = if rng.random_bool(0.85) { *tiger } else { 1 - *tiger };
-//!         let (reward, outcome) = match action {
-//!             Action::Listen => (-1.0, Outcome::Continue),
-//!             Action::Open(door) => (if door == tiger { -100.0 } else { 10.0 }, Outcome::Terminal),
-//!         };
-//!         Step { observation: heard, reward, outcome }
-//!     }
-//!     fn discount(&self) -> f64 { 0.95 }
-//! }
-//! impl Discretise for Tiger {
-//!     type Key = usize;
-//!     fn key(&self, heard: &usize) -> usize { *heard }
-//! }
-//!
-//! /// Probability that the tiger is behind door 1.
-//! struct Behind1(f64);
-//! impl Belief for Behind1 {
-//!     type State = usize;
-//!     fn sample(&self, rng: &mut Rng) -> &usize { if rng.random_bool(self.0) { &1 } else { &0 } }
-//! }
-//!
-//! let config = Config {
-//!     budget: Budget::Simulations(1 << 16),
-//!     exploration: Exploration::ReturnRange(1.0),
-//!     depth: 10,
-//!     rollout_depth: RolloutDepth::Full,
-//!     action_priors: ActionPriors::Off,
-//!     observations: Observations::Classes,
-//!     backup: Backup::Mean,
-//!     nodes: 100_000,
-//!     trees: 2,
-//!     threads: 2,
-//! };
-//! let tiger = Tiger([Action::Listen, Action::Open(0), Action::Open(1)]);
-//! let mut rng = Seed(1).stream(Purpose::Search, 0);
-//! let mut planner = Pomcp::new(config)?;
-//! let report = planner.search(&tiger, &Behind1(0.5), &UniformPolicy, 10, &mut rng);
-//! assert_eq!(report.action, Action::Listen);
-//! planner.prune(&Action::Listen, &1); // heard from door 1; after two such growls the belief is
-//! planner.prune(&Action::Listen, &1);
-//! let report = planner.search(&tiger, &Behind1(0.9698), &UniformPolicy, 8, &mut rng);
-//! assert!(report.reused > 0 && report.actions[1].value > report.actions[2].value + 90.0);
-//! # Ok::<(), planner::Error>(())
-//! ```
+//! Everything that is re-exported here; there are no public modules. The crate is made to be published: breaking changes follow semantic
+//! versioning. The search that a seed leads to may change with any version.
 //!
 //! # What was decided, and why
 //!

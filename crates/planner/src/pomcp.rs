@@ -4,7 +4,6 @@ use std::fmt::Debug;
 use std::marker::PhantomData;
 
 use pomdp::{Belief, Discretise, GenerativeModel, Policy, Rng};
-use serde::{Deserialize, Serialize};
 
 use crate::branching::{Branching, Export};
 use crate::export::{self, ExportLimit, TreeNode};
@@ -46,8 +45,9 @@ enum Root {
 }
 
 /// Why a search stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Stop {
     /// All simulations of the budget were made.
     Simulations,
@@ -58,7 +58,8 @@ pub enum Stop {
 }
 
 /// What one search found and what it cost, all trees together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SearchReport<A> {
     /// Action with the highest mean return; among equals the one with more visits, then the first.
     pub action: A,
@@ -163,9 +164,12 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
                 Budget::Milliseconds(_) => Stop::Time,
             },
         };
-        let SearchReport { simulations, transitions, nodes, unexpanded, exploration, .. } = report;
-        let value = report.actions[best].value;
-        tracing::debug!(best, value, reused, simulations, transitions, nodes, unexpanded, exploration, "search");
+        #[cfg(feature = "tracing")]
+        {
+            let SearchReport { simulations, transitions, nodes, unexpanded, exploration, .. } = report;
+            let value = report.actions[best].value;
+            tracing::debug!(best, value, reused, simulations, transitions, nodes, unexpanded, exploration, "search");
+        }
         report
     }
 

@@ -2,13 +2,13 @@
 
 use pomdp::Rng;
 use rand::RngExt as _;
-use serde::{Deserialize, Serialize};
 
 use crate::Exploration;
 use crate::nodes::Slot;
 
 /// What is known of one action at one node.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ActionStats {
     /// Simulations that took it, and initial visits: N(ha). Zero for an illegal action.
     pub visits: u64,

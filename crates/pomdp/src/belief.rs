@@ -1,7 +1,5 @@
 //! What is believed, and how it changes with an action and an observation.
 
-use serde::{Deserialize, Serialize};
-
 use crate::{GenerativeModel, Rng};
 
 /// A distribution over states that can be sampled: what a search starts from. Never empty.
@@ -48,7 +46,8 @@ impl<'a, S> Proposals<'a, S> {
 }
 
 /// What an update says about one discrete structure of the static parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StructureReport {
     /// The structure, as its `Debug` writes it.
     pub structure: String,
@@ -64,7 +63,8 @@ pub struct StructureReport {
 }
 
 /// What one belief update did.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UpdateReport {
     /// (Σw)² / Σw² of the new belief; its number of particles where they carry no weights.
     pub effective_sample_size: f64,

@@ -1,9 +1,8 @@
 //! Recorded interaction.
 
-use serde::{Deserialize, Serialize};
-
 /// One recorded step: the action, and what it brought.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Transition<A, O> {
     /// Executed action.
     pub action: A,

@@ -1,34 +1,23 @@
-//! The vocabulary of online planning under partial observability, without algorithms.
+#![doc = include_str!("../README.md")]
 //!
-//! `belief` and `planner` meet only through these traits: a [`GenerativeModel`] simulates, an [`Updater`] turns a
-//! [`Belief`] and an observation into the next belief, a [`Policy`] picks actions in rollouts, a [`Density`] is what a
-//! learned prior suggests. [`Seed`] hands out every random stream of the project.
+//! # API boundary
 //!
-//! # Example
-//!
-//! ```
-//! use pomdp::{Purpose, Seed, discounted_return};
-//! use rand::RngExt as _;
-//!
-//! // A stream is a function of its seed, purpose and number alone: whoever draws from it, and when.
-//! let draw = |number| Seed(7).stream(Purpose::World, number).random::<u64>();
-//! assert_eq!(draw(3), draw(3));
-//! assert_ne!(draw(3), draw(4));
-//! // 1 + 0.95 · (−2).
-//! assert!((discounted_return([1.0, -2.0], 0.95) - -0.9).abs() < 1e-12);
-//! ```
+//! Everything that is re-exported here, and [`conformance`]. The crate is made to be published: breaking changes follow semantic versioning: a new
+//! [`Purpose`] or a new method with a default body is none.
 
-pub mod belief;
+mod belief;
 pub mod conformance;
-pub mod episode;
-pub mod model;
-pub mod policy;
-pub mod prior;
-pub mod seed;
+mod episode;
+mod model;
+mod policy;
+mod prior;
+mod seed;
 
 pub use belief::{Belief, Proposals, StructureReport, UpdateReport, Updater};
 pub use episode::{Transition, discounted_return};
 pub use model::{Discretise, GenerativeModel, ObservationModel, Outcome, Partition, Perturb, StaticParameters, Step};
 pub use policy::{ActionPrior, Policy, UniformPolicy};
 pub use prior::{Density, Prior};
+/// Of the version that [`Rng`] belongs to.
+pub use rand;
 pub use seed::{Purpose, Rng, Seed};

@@ -96,7 +96,7 @@ pub struct BeliefConfig {
     /// The one that is used.
     pub filter: Filter,
     /// Rejection filter.
-    pub rejection: belief::Config,
+    pub rejection: belief::RejectionConfig,
     /// Weighted filter.
     pub weighted: belief::WeightedConfig,
 }

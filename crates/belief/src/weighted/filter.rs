@@ -133,6 +133,7 @@ impl<M: Trackable> Updater<M> for WeightedFilter<'_, M> {
             recoveries,
             structures,
         };
+        #[cfg(feature = "tracing")]
         tracing::debug!(?report, terminal = tally.terminal, "update");
         Ok((belief, report))
     }
