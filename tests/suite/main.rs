@@ -10,6 +10,7 @@ mod configuration;
 mod docs;
 mod doctor;
 mod kills;
+mod library;
 mod licences;
 mod output;
 mod pages;
