@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""A small world behind the protocol (docs/world-protocol.md): a disc that goes where it is pushed. Start from this file to bring your own
-robot or simulator; it needs no packages.
+"""A small world behind the protocol (docs/src/reference/world-protocol.md): a disc that goes where it is pushed.
+Start from this file to bring your own robot or simulator. It needs no packages.
 
     cargo xtask eval --domain obstacle --robot jaco --methods heuristic --world "python3 assets/worlds/example_world.py"
 """

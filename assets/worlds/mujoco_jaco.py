@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""A Jaco that pushes an object in MuJoCo, behind the world protocol (docs/world-protocol.md). It stands in for the real arm.
+"""A Jaco that pushes an object in MuJoCo, behind the world protocol (docs/src/reference/world-protocol.md). It stands in
+for the real arm.
 
     pip install mujoco numpy
     cargo xtask eval --domain obstacle --robot jaco --world "python3 assets/worlds/mujoco_jaco.py"

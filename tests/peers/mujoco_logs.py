@@ -6,7 +6,7 @@
     python tests/peers/mujoco_logs.py --out DIR --sets table_tilt:1,none:2  # --actions passive, --seed 2, --thin 2, --episodes 16
     python tests/peers/mujoco_logs.py --check                               # closed forms, one JSON object; exit status 1 beyond a limit
 
-DIR/logs/NAME is what a solver may read (docs/measured-log.md), DIR/truth/NAME.json what it has to find: effect and parameters as in
+DIR/logs/NAME is what a solver may read (docs/src/reference/measured-log.md), DIR/truth/NAME.json what it has to find: effect and parameters as in
 crates/physics-model/src/effects, "none", or "unknown" with a "kind" that no catalogue has. Names are numbers in an order that the seed shuffles;
 the seed decides everything. A set that exists is made anew.
 

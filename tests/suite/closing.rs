@@ -1,4 +1,4 @@
-//! From a hidden effect to a planner that knows of it: recorded, diagnosed, planned with, as `docs/diagnose.md` says it.
+//! From a hidden effect to a planner that knows of it: recorded, diagnosed, planned with, as `docs/src/guides/diagnose.md` says it.
 
 use crate::docs::play_with;
 use crate::pages::check_diagnosis;
@@ -13,7 +13,7 @@ fn report(folder: &std::path::Path) -> serde_json::Value {
 
 #[test]
 fn what_diagnose_finds_in_a_recorded_log_the_planner_reckons_with() {
-    let project = play_with("docs/diagnose.md", &[], &[]);
+    let project = play_with("docs/src/guides/diagnose.md", &[], &[]);
     let runs = project.path().join("runs");
     let first = report(&runs.join("tilted/found"));
     assert_eq!(first["verdict"], "effect", "{first}");

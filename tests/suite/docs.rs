@@ -4,12 +4,12 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use end_to_end::{program, root, stderr};
+use end_to_end::{files, program, root, stderr};
 
 /// Verbs whose work takes minutes and is done by other tests: here they only have to accept their options.
 const PLAYED_ELSEWHERE: [&str; 4] = ["bench", "calibrate", "diagnose", "diagnose-benchmark"];
 /// Verbs of `cargo xtask` that are no programs of ours, or need what a machine need not have.
-const NOT_HERE: [&str; 2] = ["ci", "rerun"];
+const NOT_HERE: [&str; 3] = ["ci", "docs", "rerun"];
 
 /// Lines of a document's code blocks that begin with `cargo xtask`, without their comments.
 fn commands(document: &Path) -> Vec<String> {
@@ -63,10 +63,10 @@ fn is_synopsis(command: &str) -> bool {
 }
 
 fn documents() -> Vec<PathBuf> {
-    let mut documents = vec![root().join("README.md")];
-    let docs = std::fs::read_dir(root().join("docs")).unwrap();
-    documents
-        .extend(docs.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "md")));
+    let folder = root().join("docs/src");
+    let pages = files(&folder).into_iter().map(|(path, _)| folder.join(path));
+    let mut documents: Vec<PathBuf> = pages.filter(|path| path.extension().is_some_and(|e| e == "md")).collect();
+    documents.extend([root().join("README.md"), root().join("CONTRIBUTING.md")]);
     documents.sort();
     documents
 }
@@ -183,21 +183,31 @@ fn the_readme_works() {
 }
 
 #[test]
+fn the_first_steps_work() {
+    play("docs/src/first-steps.md");
+}
+
+#[test]
+fn the_guide_to_planning_works() {
+    play("docs/src/guides/plan.md");
+}
+
+#[test]
 fn the_guide_to_your_own_arm_works() {
-    play("docs/your-arm.md");
+    play("docs/src/guides/arm.md");
 }
 
 #[test]
 fn the_guide_to_your_own_logs_works() {
-    play("docs/your-logs.md");
+    play("docs/src/guides/diagnose.md");
 }
 
 #[test]
 fn the_guide_to_your_own_effect_works() {
-    play("docs/your-effect.md");
+    play("docs/src/guides/effect.md");
 }
 
 #[test]
 fn the_guide_to_other_worlds_works() {
-    play("docs/world-protocol.md");
+    play("docs/src/guides/world.md");
 }

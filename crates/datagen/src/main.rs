@@ -31,7 +31,7 @@ struct Arguments {
     /// Shards to cut the dataset into.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     shards: u32,
-    /// Who makes the shards: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/cluster.md.
+    /// Who makes the shards: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
     /// Makes this shard alone, as the tasks of an array do; the dataset is finished by the command without it.

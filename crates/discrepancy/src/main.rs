@@ -13,7 +13,7 @@ use whole_file::Existing;
 #[derive(Debug, Parser)]
 #[command(name = "diagnose", version)]
 struct Arguments {
-    /// Folder of the log: log.toml with samples.csv or samples.parquet (docs/measured-log.md).
+    /// Folder of the log: log.toml with samples.csv or samples.parquet (docs/src/reference/measured-log.md).
     #[arg(long)]
     measured: PathBuf,
     /// Model to begin with instead of the log's nominal one: the model.toml of an earlier diagnosis.

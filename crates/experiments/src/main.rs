@@ -35,7 +35,7 @@ struct Arguments {
     /// With --all: copies the combined tables and pictures to assets/results.
     #[arg(long, requires = "all", conflicts_with = "quick")]
     publish: bool,
-    /// Arm: sawyer, jaco, or a robot file (docs/your-arm.md).
+    /// Arm: sawyer, jaco, or a robot file (docs/src/guides/arm.md).
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Preset of belief and planner.
@@ -51,8 +51,8 @@ struct Arguments {
     /// Root seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// World to play in instead of the simulated one: a command that speaks the world protocol (docs/world-protocol.md) on its
-    /// standard input and output, run without a shell, or tcp://127.0.0.1:PORT.
+    /// World to play in instead of the simulated one: a command that speaks the world protocol
+    /// (docs/src/reference/world-protocol.md) on its standard input and output, run without a shell, or tcp://127.0.0.1:PORT.
     #[arg(long, value_name = "COMMAND|ADDRESS")]
     world: Option<WorldAddress>,
     /// How long a world may take to start and say hello, s.
@@ -64,7 +64,7 @@ struct Arguments {
     /// How long a world may take for an action, s.
     #[arg(long, default_value = "60", value_parser = seconds)]
     world_act_secs: Duration,
-    /// Who plays: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/cluster.md.
+    /// Who plays: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
     /// Tasks that slurm or hq cut the trials into.

@@ -6,7 +6,7 @@
 //! DIR/samples.parquet    the same columns
 //! ```
 //!
-//! The format, its units and limits, and what the importers do to the files of others are described in `docs/measured-log.md`.
+//! `docs/src/reference/measured-log.md` describes the format, its units and limits; `docs/src/results/published-logs.md` what the importers found.
 //!
 //! Invariants:
 //!

@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand, ValueEnum};
 use measured_log::{Episode, Error, Format, Log, Notes, import};
 
-/// Turns published measurements into a log that `cargo xtask diagnose --measured` reads; see docs/measured-log.md.
+/// Turns published measurements into a log that `cargo xtask diagnose --measured` reads; see
+/// docs/src/reference/measured-log.md.
 #[derive(Debug, Parser)]
 #[command(name = "import-log", version)]
 struct Arguments {

@@ -1,4 +1,4 @@
-//! Version 1 of the world protocol: what is said, and what of it is believed. `docs/world-protocol.md` describes it.
+//! Version 1 of the world protocol: what is said, and what of it is believed. `docs/src/reference/world-protocol.md` describes it.
 
 use std::collections::BTreeMap;
 
@@ -250,7 +250,7 @@ mod tests {
 
     /// The JSON blocks of the documentation: hello, its answer, reset, its answer, act, its answer, error, close.
     fn documented(root: &Path) -> Vec<String> {
-        let text = std::fs::read_to_string(root.join("docs/world-protocol.md")).unwrap();
+        let text = std::fs::read_to_string(root.join("docs/src/reference/world-protocol.md")).unwrap();
         let blocks: Vec<String> =
             text.split("```json\n").skip(1).map(|b| b.split("```").next().unwrap().into()).collect();
         assert_eq!(blocks.len(), 8);

@@ -1,5 +1,5 @@
 //! Worlds that are not ours: a robot or another simulator behind the world protocol, JSON lines over the pipes of a child process or
-//! over a socket of this machine. `docs/world-protocol.md` is for those who write one.
+//! over a socket of this machine. `docs/src/reference/world-protocol.md` is for those who write one.
 //!
 //! What a world sends is data: it is checked field by field and never names a file or a program.
 

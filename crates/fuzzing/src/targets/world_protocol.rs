@@ -82,7 +82,7 @@ fn problem() -> &'static Problem {
 /// Outside the checkout.
 #[must_use]
 pub fn seeds() -> Vec<Vec<u8>> {
-    let text = String::from_utf8_lossy(&asset("docs/world-protocol.md")).into_owned();
+    let text = String::from_utf8_lossy(&asset("docs/src/reference/world-protocol.md")).into_owned();
     let blocks: Vec<String> = text
         .split("```json\n")
         .skip(1)

@@ -1,5 +1,5 @@
-//! Published measurements of others as logs: units and axes are changed, nothing else. `docs/measured-log.md` says where each number is from and
-//! what was found in the data.
+//! Published measurements of others as logs: units and axes are changed, nothing else. `docs/src/results/published-logs.md`
+//! says what was found in the data.
 
 mod cmu_push;
 mod contactnets;

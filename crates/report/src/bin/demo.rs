@@ -20,7 +20,7 @@ struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
     #[arg(long, default_value = "D4")]
     domain: String,
-    /// Arm: sawyer, jaco, or a robot file (docs/your-arm.md).
+    /// Arm: sawyer, jaco, or a robot file (docs/src/guides/arm.md).
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Preset of belief and planner.
