@@ -6,6 +6,8 @@
 //! neighbours repeat are written once. Numbers that are not finite are gaps; data that contradict each other are typed
 //! errors.
 //!
+//! A [`Canvas`] is a picture that its caller draws; a [`Film`] is several of them as an animated PNG.
+//!
 //! Sizes are in pixels; what values mean, their labels say: write units there (`time / s`).
 //!
 //! # Example
@@ -42,6 +44,7 @@
 extern crate self as figures;
 
 mod axis;
+mod canvas;
 mod chart;
 mod error;
 mod figure;
@@ -55,12 +58,15 @@ mod panel;
 mod scene;
 mod text;
 
+pub use canvas::{Canvas, Film, Type};
 pub use error::Error;
 pub use figure::Figure;
+pub use palette::Color;
 pub use panel::{
     Axis, Chart, Direction, Dots, Draw, Estimate, Estimates, Heat, Histogram, Lines, Map, Mark, Outline, Panel,
     Reference, Scale, Series, Stroke,
 };
+pub use scene::Align;
 
 /// Most pixels of a figure; drawing one takes 48 bytes each.
 pub const LARGEST_PX: u64 = 10_000_000;

@@ -32,14 +32,7 @@ pub(crate) fn svg(scene: &Scene) -> Result<String, Error> {
 
 /// The picture as PNG, 8 bits a channel, without an alpha channel.
 pub(crate) fn png(scene: &Scene) -> Result<Vec<u8>, Error> {
-    let (width, height) = (scene.width_px * GRID, scene.height_px * GRID);
-    let mut fine = vec![0xff; width as usize * height as usize * 3];
-    let mut backend = BitMapBackend::with_buffer(&mut fine, (width, height));
-    paint(&mut backend, scene, Joints::Discs)?;
-    backend.present().map_err(refused)?;
-    drop(backend);
-    let pixels = averaged(&fine, width as usize);
-
+    let pixels = pixels(scene)?;
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, scene.width_px, scene.height_px);
     encoder.set_color(png::ColorType::Rgb);
@@ -50,6 +43,17 @@ pub(crate) fn png(scene: &Scene) -> Result<Vec<u8>, Error> {
     writer.write_image_data(&pixels).map_err(encode)?;
     writer.finish().map_err(encode)?;
     Ok(bytes)
+}
+
+/// The picture's pixels, `[height, width, 3]`: red, green and blue from 0 to 255.
+pub(crate) fn pixels(scene: &Scene) -> Result<Vec<u8>, Error> {
+    let (width, height) = (scene.width_px * GRID, scene.height_px * GRID);
+    let mut fine = vec![0xff; width as usize * height as usize * 3];
+    let mut backend = BitMapBackend::with_buffer(&mut fine, (width, height));
+    paint(&mut backend, scene, Joints::Discs)?;
+    backend.present().map_err(refused)?;
+    drop(backend);
+    Ok(averaged(&fine, width as usize))
 }
 
 /// Means over squares of `GRID` units.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 /// Red, green, blue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Color(pub(crate) u8, pub(crate) u8, pub(crate) u8);
+pub struct Color(pub u8, pub u8, pub u8);
 
 pub(crate) const TEXT: Color = Color(0x22, 0x22, 0x22);
 pub(crate) const FRAME: Color = Color(0x88, 0x88, 0x88);
@@ -14,7 +14,7 @@ pub(crate) const REFERENCE: Color = Color(0x66, 0x66, 0x66);
 pub(crate) const WHITE: Color = Color(0xff, 0xff, 0xff);
 pub(crate) const BLUE: Color = Color(0x00, 0x72, 0xb2);
 pub(crate) const VERMILLION: Color = Color(0xd5, 0x5e, 0x00);
-const SERIES: [Color; 7] = [
+pub(crate) const SERIES: [Color; 7] = [
     BLUE,
     VERMILLION,
     Color(0x00, 0x9e, 0x73),

@@ -33,9 +33,12 @@ impl Rect {
 
 /// Where the anchor of a text is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Align {
+pub enum Align {
+    /// Where it begins.
     Start,
+    /// In its middle.
     Middle,
+    /// Where it ends.
     End,
 }
 

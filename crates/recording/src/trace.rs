@@ -66,6 +66,16 @@ impl Default for EpisodeTrace {
     }
 }
 
+impl EpisodeTrace {
+    /// Transitions simulated by the search, and by the updates of the belief; the latter `None` where the trace does not say.
+    #[must_use]
+    pub fn transitions(&self) -> (usize, Option<usize>) {
+        let search = self.moments.iter().filter_map(|moment| moment.search.as_ref()).map(|s| s.transitions).sum();
+        let updates: Vec<usize> = self.moments.iter().filter_map(|moment| moment.update_transitions).collect();
+        (search, (!updates.is_empty()).then(|| updates.iter().sum()))
+    }
+}
+
 /// A circle on the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -108,6 +118,9 @@ pub struct Moment {
     pub belief: Option<SeenBelief>,
     /// The search that chose the action before it.
     pub search: Option<SeenSearch>,
+    /// Transitions simulated to learn from the action before it; absent in files of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub update_transitions: Option<usize>,
 }
 
 /// A place and a direction.

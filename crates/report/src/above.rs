@@ -70,7 +70,7 @@ fn shown(count: usize) -> Vec<usize> {
 }
 
 /// What holds the goal, the tool, the object and the obstacle at all times; the same for all maps.
-fn limits(trace: &EpisodeTrace) -> Option<((f64, f64), (f64, f64))> {
+pub(crate) fn limits(trace: &EpisodeTrace) -> Option<((f64, f64), (f64, f64))> {
     let goal = circle(trace.goal.center_m, trace.goal.radius_m);
     let of_truth = |scene: &Scene| -> Vec<(f64, f64)> {
         [Some(scene.object), scene.obstacle].iter().flatten().flat_map(Body::footprint_m).collect()
@@ -139,7 +139,7 @@ fn outline(name: &str, points: Vec<(f64, f64)>, draw: Draw) -> Outline {
     Outline { name: name.into(), like: String::new(), points, draw }
 }
 
-fn circle(center_m: [f64; 2], radius_m: f64) -> Vec<(f64, f64)> {
+pub(crate) fn circle(center_m: [f64; 2], radius_m: f64) -> Vec<(f64, f64)> {
     let point = |i: i32| {
         let angle = std::f64::consts::TAU * f64::from(i) / 48.0;
         (center_m[0] + radius_m * angle.cos(), center_m[1] + radius_m * angle.sin())
@@ -148,7 +148,7 @@ fn circle(center_m: [f64; 2], radius_m: f64) -> Vec<(f64, f64)> {
 }
 
 /// The parts of the tool from above: a ball is a circle, a capsule two half circles.
-fn outline_of_tool(trace: &EpisodeTrace, moment: &Moment) -> Vec<Vec<(f64, f64)>> {
+pub(crate) fn outline_of_tool(trace: &EpisodeTrace, moment: &Moment) -> Vec<Vec<(f64, f64)>> {
     let part = |part: &recording::ToolPart| {
         let from = moment.tool.point_m(part.from_m);
         let to = moment.tool.point_m(part.to_m);

@@ -45,11 +45,11 @@ pub fn summary(trace: &EpisodeTrace, record: &TrialRecord) -> String {
     let end = if trace.success { "reached the goal" } else { "did not reach the goal" };
     let why = if trace.success { String::new() } else { format!(" ({})", trace.reason) };
     let mut out = format!(
-        "\n{end}{why} after {} actions in {:.0} s: {:.2} s a decision, {} transitions simulated\n",
+        "\n{end}{why} after {} actions in {:.0} s: {:.2} s a decision, {}\n",
         record.steps,
         record.seconds,
         record.decision_seconds / record.steps.max(1) as f64,
-        record.transitions
+        transitions(trace)
     );
     let truth = trace.moments.iter().find_map(|moment| moment.truth.as_ref());
     let Some(belief) = trace.moments.iter().rev().find_map(|moment| moment.belief.as_ref()) else { return out };
@@ -68,6 +68,19 @@ pub fn summary(trace: &EpisodeTrace, record: &TrialRecord) -> String {
         let _ = writeln!(out, "{name:<22} {interval:<24} {truth}");
     }
     out
+}
+
+/// What was simulated, with its parts where there are two.
+#[must_use]
+pub fn transitions(trace: &EpisodeTrace) -> String {
+    let (search, updates) = trace.transitions();
+    match updates {
+        Some(updates) if updates > 0 => {
+            let total = search + updates;
+            format!("{total} transitions simulated: {search} by the search, {updates} to update the belief")
+        }
+        _ => format!("{search} transitions simulated by the search"),
+    }
 }
 
 fn percent(probability: f64) -> String {

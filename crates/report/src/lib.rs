@@ -1,6 +1,6 @@
 //! Pictures and pages of episodes and runs, for people.
 //!
-//! An [`Observer`] looks on at an episode, of which an [`EpisodeTrace`](recording::EpisodeTrace) is kept; [`episode_figure`] draws that from above.
+//! An [`Observer`] looks on at an episode, of which an [`EpisodeTrace`](recording::EpisodeTrace) is kept; [`episode_figure`] draws that from above, [`episode_film`] as a moving picture.
 //! [`episode_page`], [`run_page`] and [`suite_page`] are self-contained HTML. Programs `demo` and `report`.
 //!
 //! # Example
@@ -14,10 +14,12 @@
 mod above;
 pub mod describe;
 mod error;
+mod film;
 mod observer;
 mod page;
 
 pub use above::episode_figure;
 pub use error::Error;
+pub use film::episode_film;
 pub use observer::{Observer, tool_parts};
 pub use page::{Suite, episode_page, may_be_replaced, run_page, suite_page};

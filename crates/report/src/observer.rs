@@ -62,6 +62,9 @@ impl Watcher for Observer<'_> {
                 nodes: report.nodes,
                 actions: report.actions.iter().map(|a| RootAction { visits: a.visits, value: a.value }).collect(),
             }),
+            // A step counts those of its search as well.
+            update_transitions: step
+                .map(|s| s.transitions.saturating_sub(glimpse.search.map_or(0, |search| search.transitions))),
         };
         (self.tell)(&moment);
         self.moments.push(moment);

@@ -24,7 +24,7 @@ pub(super) fn segment(from: Point, to: Point, area: &Rect) -> Option<(Point, Poi
 }
 
 /// The parts of a line inside.
-pub(super) fn line(points: &[Point], area: &Rect) -> Vec<Vec<Point>> {
+pub(crate) fn line(points: &[Point], area: &Rect) -> Vec<Vec<Point>> {
     let mut parts: Vec<Vec<Point>> = Vec::new();
     for pair in points.windows(2) {
         let Some((from, to)) = segment(pair[0], pair[1], area) else { continue };
@@ -37,7 +37,7 @@ pub(super) fn line(points: &[Point], area: &Rect) -> Vec<Vec<Point>> {
 }
 
 /// The part of a polygon inside, after Sutherland and Hodgman (1974).
-pub(super) fn polygon(points: &[Point], area: &Rect) -> Vec<Point> {
+pub(crate) fn polygon(points: &[Point], area: &Rect) -> Vec<Point> {
     let inside: [&dyn Fn(&Point) -> f64; 4] =
         [&|p| p.0 - area.left, &|p| area.right - p.0, &|p| p.1 - area.top, &|p| area.bottom - p.1];
     let mut points = points.to_vec();

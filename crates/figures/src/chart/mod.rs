@@ -1,6 +1,6 @@
 //! The kinds of charts, each: what is wrong with its data, its axes, its legend, its shapes.
 
-mod clip;
+pub(crate) mod clip;
 mod dots;
 mod heat;
 mod histogram;

@@ -10,10 +10,10 @@ use experiments::{TrialRecord, play_watched};
 use pomdp::Seed;
 use prior::Suggester;
 use recording::{EpisodeTrace, Moment};
-use report::{Observer, describe, episode_figure, episode_page};
+use report::{Observer, describe, episode_figure, episode_film, episode_page};
 use scenario::{Problem, Scenario, Selection};
 
-/// Plays one episode, shows it in the terminal, and leaves a picture from above, a page and a trace of it.
+/// Plays one episode, shows it in the terminal, and leaves a moving picture of it from above, a picture of the whole, a page and a trace.
 #[derive(Debug, Parser)]
 #[command(name = "demo", version)]
 struct Arguments {
@@ -112,7 +112,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         whole_file::print(&format!("{}\n", serde_json::to_string(&record)?)).context(Failed)?;
     } else {
         whole_file::print(&describe::summary(&trace, &record)).context(Failed)?;
-        whole_file::say!("written to {}: episode.png, episode.html, trace.json", out.display());
+        whole_file::say!("written to {}: animation.png, episode.png, episode.html, trace.json", out.display());
     }
     Ok(())
 }
@@ -176,7 +176,9 @@ fn write(trace: &EpisodeTrace, out: &Path) -> Result<()> {
     let figure = episode_figure(trace);
     figure.save(&out.join("episode"))?;
     let page = episode_page(trace, &figure.svg()?);
-    whole_file::write(&out.join("episode.html"), page.as_bytes(), whole_file::Existing::Replace)
-        .map_err(|e| anyhow::anyhow!("cannot write {}: {}", e.path.display(), e.source))?;
+    for (name, bytes) in [("animation.png", episode_film(trace)?), ("episode.html", page.into_bytes())] {
+        whole_file::write(&out.join(name), &bytes, whole_file::Existing::Replace)
+            .map_err(|e| anyhow::anyhow!("cannot write {}: {}", e.path.display(), e.source))?;
+    }
     Ok(())
 }
