@@ -2,7 +2,7 @@
 
 use crate::Error;
 
-/// Beyond these a typing error would take all memory, or all night.
+/// Limits against typing errors: more would take all memory, or all night.
 pub(crate) const MOST_PARTICLES: usize = 1_000_000;
 pub(crate) const MOST_ATTEMPTS: usize = 100_000_000;
 
@@ -43,8 +43,8 @@ pub struct RejectionConfig {
     pub max_attempts: usize,
     /// Share of `max_attempts` that is kept for perturbed particles, in [0, 1). Zero means no reinvigoration by noise.
     pub noise_share: f64,
-    /// Largest share of a belief that comes from outside proposals while simulation accepts anything, in [0, 1). Zero ignores
-    /// proposals, even where nothing else explains the observation.
+    /// Largest share of a belief that comes from outside proposals while simulation accepts anything, in [0, 1). Zero
+    /// ignores proposals, even if nothing else explains the observation.
     pub proposal_share: f64,
 }
 

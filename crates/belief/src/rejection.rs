@@ -10,19 +10,20 @@ use crate::{Error, Particles, RejectionConfig};
 /// One update from belief b, action a and real observation o makes N = `particles` equally weighted particles, of which
 /// P = min(|proposals|, ⌊`proposal_share` · N⌋) places belong to proposals:
 ///
-/// 1. Rejection: draw s from b, step it with a, keep s' if its observation has the class of o; until N − P particles are kept or
-///    the attempts of this phase, (1 − `noise_share`) · `max_attempts`, are used.
-/// 2. Reinvigoration: the same with noise added to s before the step; until N − P are kept or all attempts are used.
-/// 3. Filling: where at least one particle but fewer than N − P were kept, they are duplicated uniformly.
-/// 4. Proposals: the first P, in the caller's order, take their places. The caller has checked them against o. Where simulation
-///    kept nothing at all, the belief is made of proposals alone, duplicated to N likewise; where there are none either, or
-///    `proposal_share` is zero, the update fails as depleted.
+/// 1. Rejection: draw s from b, step it with a, keep s' if its observation has the class of o. Stop at N − P particles
+///    or after (1 − `noise_share`) · `max_attempts` attempts.
+/// 2. Reinvigoration: the same, with noise added to s before the step. Stop at N − P particles or after all attempts.
+/// 3. Filling: if fewer than N − P particles were kept, but at least one, they are duplicated uniformly.
+/// 4. Proposals: the first P, in the caller's order, take their places. The caller has checked them against o. If
+///    simulation kept nothing, the belief consists of proposals alone, duplicated to N. If there are no proposals
+///    either, or `proposal_share` is zero, the update fails as depleted.
 ///
-/// A step that ends in a terminal state disagrees: the filter is called only while the real episode goes on, and a particle whose
-/// episode is over cannot be stepped again. A diverged world has likelihood zero: it is dropped and counted.
+/// A step that ends in a terminal state disagrees with o, because the filter is called only while the real episode goes
+/// on. A diverged world has likelihood zero. It is dropped and counted.
 ///
-/// `log_evidence` is ln(acceptance) of phase 1 alone, for perturbed particles come from another distribution than b. `acceptance`
-/// is that of both phases. The density of proposals is not used. Every attempt is one transition on one clone of a state.
+/// `log_evidence` is ln(acceptance) of phase 1 alone, because perturbed particles do not come from b. `acceptance`
+/// covers both phases. The density of proposals is not used. Every attempt costs one clone of a state and one
+/// transition.
 #[derive(Clone, Debug)]
 pub struct RejectionFilter {
     config: RejectionConfig,

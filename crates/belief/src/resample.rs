@@ -15,12 +15,12 @@ pub(crate) struct Quota {
     pub(crate) threshold: f64,
 }
 
-/// `count` draws from the normalised `weights`, stratified (Douc, Cappé and Moulines 2005) within each structure; `kinds` is the structure
-/// of each particle, of `structures` many.
+/// `count` draws from the normalised `weights`, stratified within each structure (Douc, Cappé and Moulines 2005).
+/// `kinds` is the structure of each particle, an index below `structures`.
 ///
-/// Each likely structure κ gets n_κ particles of weight P_κ / n_κ, where P_κ is its probability: however the n_κ are chosen, the expected
-/// weight of every particle stays what it was. The unlikely ones are drawn as one group. Equal weights within a group replace the
-/// old ones. A group so light that they could underflow to 0 is not drawn, and leaves its draws to the others: no particle has the weight 0.
+/// Each likely structure κ gets n_κ particles of weight P_κ / n_κ, where P_κ is its probability. The expected weight of
+/// every particle stays the same for any n_κ. The unlikely structures are drawn as one group. A group whose weights
+/// could underflow to 0 is not drawn, and the others get its draws: no particle has weight 0.
 pub(crate) fn resample(
     weights: &[f64],
     kinds: &[usize],
@@ -145,9 +145,10 @@ mod tests {
 
     #[test]
     fn the_expected_weight_of_every_particle_stays() {
-        // Null: E[new weight of i] = w_i. n = 20,000 repetitions of 16 draws; a particle's new weight is bounded by its group's mass, and
-        // its standard error estimated from the repetitions; tolerance 4.5 of them for 12 particles times two quotas. Structure 2 (mass
-        // 0.01) has a quota of 4 in the second case, that is 25 times its share; structure 3 is unlikely in it.
+        // Null: E[new weight of i] = w_i. n = 20,000 repetitions of 16 draws. The standard error of a particle's new
+        // weight is estimated from the repetitions. Tolerance: 4.5 standard errors, for 12 particles times two quotas.
+        // Structure 2 (mass 0.01) has a quota of 4 in the second case, that is 25 times its share; structure 3 is
+        // unlikely in it.
         let raw = [5.0, 0.1, 3.0, 2.0, 0.7, 0.2, 4.0, 0.05, 0.06, 0.02, 0.03, 0.5];
         let kinds = [0, 0, 1, 1, 0, 1, 0, 2, 2, 3, 3, 0];
         let total: f64 = raw.iter().sum();

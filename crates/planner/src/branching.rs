@@ -1,4 +1,4 @@
-//! What a search needs of a tree, whatever an observation does to it.
+//! What a search needs of a tree, for both kinds of branching.
 
 use pomdp::{GenerativeModel, Rng, Step};
 

@@ -61,14 +61,16 @@ pub struct Config {
     /// What an action learns from a simulation that explores below it. A file without this key means the mean.
     #[cfg_attr(feature = "serde", serde(default))]
     pub backup: Backup,
-    /// Most nodes of all trees together, at least one a tree. States stored by progressive widening count as nodes. Once they are
-    /// used up nothing is added any more: simulations turn into rollouts where they leave the tree, and
+    /// Most nodes of all trees together, at least one per tree. States stored by progressive widening count as nodes.
+    /// When the nodes are used up, the tree stops growing: simulations that leave it continue as rollouts, and
     /// [`crate::SearchReport::unexpanded`] counts them. Pruning frees nodes.
     pub nodes: usize,
-    /// Independent trees (root parallelism), which share the budget evenly. Each has its own random stream, drawn from the caller's
-    /// generator; a single tree uses that generator itself. The action is chosen by the merged statistics of their roots.
+    /// Independent trees (root parallelism) that share the budget evenly. Each has its own random stream, drawn from
+    /// the caller's generator; a single tree uses that generator itself. The merged statistics of their roots choose
+    /// the action.
     pub trees: usize,
-    /// Threads that simulate the trees, the caller's included. Without influence on the result, unless the budget is a time.
+    /// Threads that simulate the trees, the caller's included. The number does not change the result, unless the budget
+    /// is a time.
     pub threads: usize,
 }
 
@@ -80,11 +82,11 @@ pub struct Config {
 pub enum Budget {
     /// Exactly this many simulations.
     Simulations(usize),
-    /// At most this many transitions of the model. A simulation that could overrun the budget is not started, so up to
-    /// `depth` − 1 transitions a tree stay unused: cutting the last simulation short would bias the value it contributes to.
+    /// At most this many transitions of the model. A simulation that could overrun the budget is not started, because
+    /// cutting it short would bias its value. So up to `depth` − 1 transitions per tree stay unused.
     Transitions(usize),
-    /// Wall-clock time, ms: no simulation starts later, and every tree makes at least one. For live use only, since the same seed
-    /// gives another result on another day.
+    /// Wall-clock time, ms. No simulation starts later, and every tree makes at least one. For live use only: the same
+    /// seed may give another result.
     Milliseconds(u64),
 }
 
@@ -96,8 +98,8 @@ pub enum Budget {
 pub enum Exploration {
     /// This value, in units of reward.
     Fixed(f64),
-    /// This factor times the range of the returns seen at the root, so that one setting serves problems of any scale. The range
-    /// grows during a search; it starts from the mean returns that a pruned tree brings along.
+    /// This factor times the range of the returns seen at the root, so that one setting serves problems of any scale.
+    /// The range grows during a search. After pruning it starts from the mean returns that were kept.
     ReturnRange(f64),
 }
 
@@ -109,7 +111,7 @@ pub enum Exploration {
 pub enum RolloutDepth {
     /// To the horizon of the simulation, as published.
     Full,
-    /// At most this many actions; what would follow counts as [`pomdp::Policy::leaf_value`].
+    /// At most this many actions; the rest counts as [`pomdp::Policy::leaf_value`].
     Actions(usize),
 }
 
@@ -135,9 +137,9 @@ pub enum ActionPriors {
 pub enum Observations {
     /// One branch per class of observations ([`pomdp::Discretise`]): [`crate::Pomcp`].
     Classes,
-    /// Progressive widening: an action with N visits gets a new branch, with the observation just simulated, while it has at most
-    /// `factor` · N^`exponent` of them; nodes hold states weighted by the likelihood of their observation
-    /// ([`pomdp::ObservationModel`]): [`crate::Pomcpow`].
+    /// Progressive widening, for [`crate::Pomcpow`]. An action with N visits gets a new branch, with the observation
+    /// just simulated, while it has at most `factor` · N^`exponent` of them. Nodes hold states weighted by the
+    /// likelihood of their observation ([`pomdp::ObservationModel`]).
     Widening {
         /// k_o, positive.
         factor: f64,
@@ -155,10 +157,11 @@ pub enum Backup {
     /// The return of the simulation, as published: V(ha) is the mean return of simulations that explore.
     #[default]
     Mean,
-    /// The return where the simulation took the best action known at the node, else the value of that action: a return is cut where the
-    /// simulation explored. This is Q(λ) of Watkins ("Learning from delayed rewards", 1989; Sutton and Barto 2018, section 12.10) with
-    /// λ = 1 and a step size of 1/N(ha). Khandelwal, Liebman, Niekum and Stone ("On the analysis of complex backup strategies in Monte
-    /// Carlo tree search", ICML 2016) compare such backups. For problems where one wrong action costs much more than right ones differ by.
+    /// The return where the simulation took the best action known at the node; elsewhere the value of that best action.
+    /// So a return is cut where the simulation explored. This is Q(λ) of Watkins ("Learning from delayed rewards",
+    /// 1989; Sutton and Barto 2018, section 12.10) with λ = 1 and a step size of 1/N(ha). Khandelwal, Liebman, Niekum
+    /// and Stone ("On the analysis of complex backup strategies in Monte Carlo tree search", ICML 2016) compare such
+    /// backups. Use it where one wrong action costs much more than good actions differ by.
     Watkins,
 }
 

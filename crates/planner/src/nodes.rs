@@ -1,6 +1,6 @@
 //! Arena of history nodes: one slot per action, N(ha), V(ha) and where its branches start.
 //!
-//! Slots lie side by side: those of node n at n × actions. N(h) is not stored: it is the sum of N(ha) over the legal actions. Node 0
+//! The slots of node n start at n × actions. N(h) is not stored: it is the sum of N(ha) over the legal actions. Node 0
 //! is the root. A node is always added after its parent, so a parent's index is the smaller one.
 
 use pomdp::ActionPrior;
@@ -90,7 +90,7 @@ impl Nodes {
         self.slots.len() / self.actions
     }
 
-    /// Whether `more` nodes besides those of the arena (states stored elsewhere) use up the limit.
+    /// Whether the limit is reached by the nodes of the arena and `more` states that are stored elsewhere.
     pub(crate) fn full(&self, more: usize) -> bool {
         self.count() + more >= self.limit
     }

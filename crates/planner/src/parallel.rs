@@ -1,7 +1,7 @@
 //! Root parallelism: independent trees on a few threads.
 //!
-//! Scoped threads of the standard library: a search lasts milliseconds to seconds, against some 50 µs to start them, and a pool
-//! shared with the caller's own parallel work (a trial per thread) would make each of them wait for the other's trees.
+//! The threads are scoped threads of the standard library. Starting them takes some 50 µs, a search milliseconds to
+//! seconds. With a pool that the caller's own parallel work shares, each of them would wait for the other's trees.
 
 use std::sync::Mutex;
 

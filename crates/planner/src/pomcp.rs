@@ -16,23 +16,24 @@ use crate::{Budget, Config, Error, parallel};
 
 /// POMCP on classes of observations: [`search`](Planner::search), act, [`prune`](Planner::prune), search again.
 ///
-/// Differences from the printed algorithm: the root sampler is a belief from outside instead of particles in the nodes; the
-/// root exists before the first simulation; simulations end at a stated depth instead of where γ^depth < ε.
+/// Differences from the printed algorithm: the root state is sampled from a belief that is passed in, not from
+/// particles in the nodes. The root exists before the first simulation. Simulations end at a stated depth instead of
+/// where γ^depth < ε.
 pub type Pomcp<M> = Planner<M, KeyTree<<M as Discretise>::Key>>;
 
 /// POMCPOW on continuous observations: [`search`](Planner::search), act, [`reset`](Planner::reset), search again.
 ///
-/// No branch belongs to the observation that is really received, so nothing of a tree is kept after an action.
+/// No branch belongs to the real observation, so the tree is dropped after each action.
 ///
-/// Differences from the printed algorithm: those of [`Pomcp`]; all actions of the model's finite set are tried; states that end the
-/// episode are not held in branches, for an agent sees that its episode has ended.
+/// Differences from the printed algorithm: those of [`Pomcp`]. All actions of the model's finite set are tried.
+/// Branches do not hold states that end the episode, because an agent sees that its episode has ended.
 pub type Pomcpow<M> = Planner<M, TreeOf<M>>;
 
 /// A search with `config.trees` trees that persist between decisions: see [`Pomcp`] and [`Pomcpow`].
 pub struct Planner<M: GenerativeModel, T> {
     config: Config,
     actions: Vec<M::Action>,
-    /// With whether the root was reached by a simulation; empty until the first search.
+    /// Each with whether a simulation has reached its root. Empty until the first search.
     trees: Vec<(T, Root)>,
     model: PhantomData<fn(&M)>,
 }
@@ -63,24 +64,24 @@ pub enum Stop {
 pub struct SearchReport<A> {
     /// Action with the highest mean return; among equals the one with more visits, then the first.
     pub action: A,
-    /// Statistics of the root's actions in the model's order, those of kept subtrees and initial visits included. Several trees
-    /// are merged by visits: the mean of all their returns.
+    /// Statistics of the root's actions in the model's order, including kept subtrees and initial visits. With several
+    /// trees a value is the mean of all their returns.
     pub actions: Vec<ActionStats>,
     /// Simulations of this search.
     pub simulations: usize,
     /// Transitions of the model in this search.
     pub transitions: usize,
-    /// Most actions that one simulation of this search took inside a tree.
+    /// Most actions that a simulation of this search took inside a tree.
     pub depth: usize,
-    /// Nodes after this search; in widened trees with the states that they hold.
+    /// Nodes after this search. In widened trees the states that they hold count too.
     pub nodes: usize,
-    /// Visits of the roots that were kept from earlier searches, initial ones included.
+    /// Visits of the roots from earlier searches, initial visits included.
     pub reused: u64,
     /// Simulations that ended in a terminal state.
     pub terminal: usize,
     /// Simulations whose world diverged.
     pub diverged: usize,
-    /// Simulations that found no place for a new node, because `nodes` were used up.
+    /// Simulations that found no room for a new node, because `nodes` were used up.
     pub unexpanded: usize,
     /// Exploration constant c of the last simulation; the mean over the trees.
     pub exploration: f64,
@@ -100,14 +101,14 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
         Ok(Self { config, actions: Vec::new(), trees: Vec::new(), model: PhantomData })
     }
 
-    /// Searches from `belief` and names the action to execute.
+    /// Searches from `belief` and returns the action to execute.
     ///
     /// `remaining_horizon` is the number of actions that the episode still allows, the next one included. Every simulation
     /// clones one state of the belief and steps that clone in place.
     ///
     /// # Panics
     ///
-    /// When no action remains, when the model has no actions, when they changed since the last [`reset`](Self::reset), or when
+    /// If no action remains, if the model has no actions or changed them since the last [`reset`](Self::reset), or if
     /// the policy calls every action of a state illegal.
     pub fn search<B, P>(
         &mut self,
@@ -185,7 +186,7 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
 }
 
 impl<M: GenerativeModel, T: Export> Planner<M, T> {
-    /// Tree number `tree` as it stands, to look at; `None` where there is none.
+    /// Tree number `tree` as data. `None` if there is no such tree.
     #[must_use]
     pub fn tree(&self, tree: usize, limit: ExportLimit) -> Option<TreeNode>
     where
@@ -208,7 +209,7 @@ where
     ///
     /// # Panics
     ///
-    /// When `action` is none of the model's.
+    /// If the model has no such action.
     pub fn prune(&mut self, action: &M::Action, key: &M::Key) {
         if self.trees.is_empty() {
             return;

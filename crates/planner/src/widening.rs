@@ -1,9 +1,9 @@
-//! The search tree of continuous observations: POMCPOW (Sunberg and Kochenderfer, "Online algorithms for POMDPs with continuous
-//! state, action, and observation spaces", ICAPS 2018, algorithm 2), with all actions of a finite set.
+//! The search tree for continuous observations and a finite set of actions: POMCPOW (Sunberg and Kochenderfer, "Online
+//! algorithms for POMDPs with continuous state, action, and observation spaces", ICAPS 2018, algorithm 2).
 //!
-//! A branch holds the states of all simulations that came through it, each weighted by the likelihood of the branch's observation
-//! and with the reward of the step that led to it. A simulation goes on from one drawn by weight, so that below a branch the belief
-//! is that of its observation, although no two simulations see the same one.
+//! A branch holds the states of all simulations that came through it. Each has the likelihood of the branch's
+//! observation as weight, and the reward of the step that led to it. A simulation goes on from one drawn by weight, so
+//! that below a branch the belief is that of its observation, although no two simulations see the same one.
 
 use pomdp::{GenerativeModel, ObservationModel, Rng, Step};
 use rand::RngExt as _;

@@ -13,15 +13,17 @@ pub trait Belief {
 
 /// States after the action suggested from outside (a learned prior), with the density that they were drawn from.
 ///
-/// Draws alone do not tell how much to believe them. Whoever knows the density passes it as a function rather than a number a draw, for a
-/// filter needs it at its own particles too: only then are the importance weights of a mixture bounded (the balance heuristic of Veach and
-/// Guibas 1995; Owen and Zhou 2000).
+/// Draws alone do not tell how much to believe them. Pass the density if you know it. It is a function, because a
+/// filter evaluates it at its own particles too: that bounds the importance weights of the mixture (balance heuristic;
+/// Veach and Guibas 1995, Owen and Zhou 2000).
 #[derive(Clone, Copy)]
 pub struct Proposals<'a, S> {
-    /// The draws, independent of each other and all that were made: leaving out what does not fit the observation changes the density.
+    /// All draws that were made, independent of each other. Leaving out those that do not fit the observation would
+    /// change the density.
     pub states: &'a [S],
-    /// ln q of the draws' static parameters: probability of the structure times density of the continuous parameters in the coordinates of
-    /// [`crate::StaticParameters`], the rest of the state integrated out. `None` where it is unknown.
+    /// ln q of the draws' static parameters, with the rest of the state integrated out. q is the probability of the
+    /// structure times the density of the continuous parameters in the coordinates of [`crate::StaticParameters`].
+    /// `None` where it is unknown.
     pub log_density: Option<&'a (dyn Fn(&S) -> f64 + Sync)>,
 }
 
@@ -55,8 +57,8 @@ pub struct StructureReport {
     pub prior: f64,
     /// Its probability after the observation.
     pub posterior: f64,
-    /// Estimate of ln p(o | history, a, structure); −∞ where no particle of the structure explained it. Only where the update reached
-    /// temperature 1: else the structures' shares are those of the tempered likelihood.
+    /// Estimate of ln p(o | history, a, structure); −∞ where no particle of the structure explained it. Valid only
+    /// where the update reached temperature 1. Below that it belongs to the tempered likelihood.
     pub log_evidence: f64,
     /// Particles of the structure in the new belief.
     pub particles: usize,
@@ -66,14 +68,14 @@ pub struct StructureReport {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UpdateReport {
-    /// (Σw)² / Σw² of the new belief; its number of particles where they carry no weights.
+    /// Effective sample size (Σw)² / Σw² of the new belief. For a filter without weights: the number of particles.
     pub effective_sample_size: f64,
-    /// The same after weighting with the whole likelihood, before anything was resampled; the number of agreeing particles in a filter
-    /// without weights.
+    /// Effective sample size after weighting with the whole likelihood and before resampling. For a filter without
+    /// weights: the number of particles that agree with the observation.
     pub effective_sample_size_before: f64,
     /// Estimate of ln p(o | history, a); −∞ where no simulated particle agreed with the observation.
     pub log_evidence: f64,
-    /// Share of the simulated particles that agreed with the observation: whose likelihood is not zero.
+    /// Share of the simulated particles whose likelihood is not zero.
     pub acceptance: f64,
     /// Particles of the new belief.
     pub particles: usize,
@@ -89,16 +91,17 @@ pub struct UpdateReport {
     pub resampled: bool,
     /// Intermediate distributions between prediction and posterior.
     pub bridges: usize,
-    /// Exponent of the likelihood that the new belief has reached: 1 is the posterior, less a broader one, for the budget was spent.
+    /// Exponent of the likelihood that the new belief has reached. 1 is the posterior. Less is a broader distribution:
+    /// the budget ran out first.
     pub temperature: f64,
     /// Share of the moves between bridges that were accepted; 0 where there were none.
     pub move_acceptance: f64,
-    /// How much less likely the observation is to the best particle than a particle's own observation is to itself on average, nats.
-    /// About 0 or below while the belief holds the truth; large where nothing in it explains the observation.
+    /// ln p of a particle's own simulated observation, averaged over the particles, minus the largest ln p of the real
+    /// one, nats. About 0 or below while the belief holds the truth. Large where no particle explains the observation.
     pub surprise: f64,
     /// Beliefs drawn anew from the start of the episode: 0 or 1.
     pub recoveries: usize,
-    /// Probability and evidence of each structure; empty for filters that keep no books on them.
+    /// Probability and evidence of each structure. Empty for filters that do not track structures.
     pub structures: Vec<StructureReport>,
 }
 
@@ -109,7 +112,7 @@ pub trait Updater<M: GenerativeModel> {
     /// Why no belief could be formed; depletion among them.
     type Error: std::error::Error;
 
-    /// Forgets what it remembers of the episode: a new one begins. Nothing, for a filter without memory.
+    /// Forgets the episode: a new one begins. A filter without memory does nothing.
     fn reset(&mut self) {}
 
     /// Belief after `action` was executed in `belief` and `observation` received.

@@ -96,7 +96,8 @@ fn walk<M: GenerativeModel>(model: &M, initial: &[M::State], steps: usize) -> Ve
     seen
 }
 
-/// Simulated observations have a finite likelihood, and a larger one in their own state than in another on average (Gibbs' inequality).
+/// Simulated observations have a finite likelihood. On average it is larger in their own state than in another (Gibbs'
+/// inequality).
 ///
 /// The initial states must differ in what they show; the more steps, the surer the second check.
 ///
@@ -222,10 +223,11 @@ where
     }
 }
 
-/// Parameters survive the way out and in, the structure stays, and states of one structure have as many values.
+/// Parameters that are read and written back stay the same, the structure stays, and all states of a structure have
+/// equally many values.
 ///
-/// Each state also gets the parameters of every other one of its structure, where that is possible: they must then be its own, to within
-/// `tolerance` (relative to 1 + the value).
+/// Each state is also given the parameters of every other state of its structure, where that is possible. Reading them
+/// back must give the same values, to within `tolerance` (relative to 1 + the value).
 ///
 /// # Panics
 ///
@@ -299,8 +301,8 @@ where
     }
 }
 
-/// The density integrates to one over a region that holds (nearly) all of it, of the given `volume`, from which `uniform` draws: within 4
-/// standard errors of `draws` draws, which must be enough to be sure to 10 %.
+/// The density integrates to one over a region that holds nearly all of it. `volume` is the volume of the region and
+/// `uniform` draws from it. The integral may be off by 4 standard errors of `draws` draws, which must be below 10 %.
 ///
 /// # Panics
 ///

@@ -2,8 +2,8 @@
 //!
 //! # API boundary
 //!
-//! Everything that is re-exported here, and [`conformance`]. The crate is made to be published: breaking changes follow semantic versioning: a new
-//! [`Purpose`] or a new method with a default body is none.
+//! Everything that is re-exported here, and [`conformance`]. The crate is made to be published, so breaking changes
+//! follow semantic versioning. A new [`Purpose`] or a new method with a default body does not count as one.
 
 mod belief;
 pub mod conformance;

@@ -1,8 +1,8 @@
-//! Action choice without search, and what else a search may be told about a problem.
+//! Action choice without search, and advice for a search.
 
 use crate::{GenerativeModel, Rng};
 
-/// What is known of one action at a new node of a search, before it was simulated there.
+/// Advice on one action at a new node of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActionPrior {
     /// Whether the action may be taken at all. At least one action of a state is legal.
@@ -19,22 +19,22 @@ impl Default for ActionPrior {
     }
 }
 
-/// A policy on the full state: default policy of rollouts, baseline, data collection; with optional advice for a search.
+/// A policy on the full state, for rollouts, baselines and data collection. It may also advise a search.
 ///
-/// A search asks in a state that was sampled from a belief: advice that looks at what the agent cannot see makes the search
-/// optimistic. States may carry what the agent knows of its history (counts of measurements, its last action), so that advice can
-/// depend on the history without being given one.
+/// A search asks in a state that was sampled from a belief. Advice that uses what the agent cannot see makes the search
+/// optimistic. States may carry what the agent knows of its history, such as counts of measurements or its last action.
+/// Advice can then depend on the history.
 pub trait Policy<M: GenerativeModel> {
     /// Action to take in `state`.
     fn action(&self, model: &M, state: &M::State, rng: &mut Rng) -> M::Action;
 
-    /// Writes what is known of the actions at a new node, one entry per action of the model and in its order: which are illegal
-    /// and which are preferred (Silver and Veness 2010, section 5). `state` is that of the simulation that adds the node. Every
-    /// entry arrives as [`ActionPrior::default`]; by default nothing is known.
+    /// Advice on the actions at a new node: which are illegal and which are preferred (Silver and Veness 2010, section
+    /// 5). There is one entry per action, in the model's order. Each arrives as [`ActionPrior::default`], which says
+    /// nothing. `state` is the state of the simulation that adds the node.
     fn priors(&self, _model: &M, _state: &M::State, _priors: &mut [ActionPrior]) {}
 
-    /// Discounted return expected from `state` on, where a rollout was cut with `actions_left` actions to go before the horizon of
-    /// its simulation. Zero by default. Never asked in a terminal state nor at the horizon.
+    /// Discounted return expected from `state` on, where a rollout is cut `actions_left` actions before the horizon of
+    /// its simulation. Zero by default. Not called in a terminal state or at the horizon.
     fn leaf_value(&self, _model: &M, _state: &M::State, _actions_left: usize) -> f64 {
         0.0
     }

@@ -9,8 +9,8 @@ pub type Rng = rand_chacha::ChaCha8Rng;
 
 /// What a stream is used for.
 ///
-/// The named purposes are those of planning under partial observability and of learning a prior. Whoever needs others numbers them with
-/// [`Purpose::Custom`].
+/// The named purposes cover planning under partial observability and learning a prior. Use [`Purpose::Custom`] for
+/// others.
 ///
 /// # Example
 ///
@@ -56,7 +56,8 @@ pub enum Purpose {
     Test,
     /// Noise of the size of a training target's resolution.
     Resolution,
-    /// A purpose of your own, by a number of your choice. Two libraries that work below one root seed keep apart by a [`Seed::child`] each.
+    /// A purpose of your own, with a number that you choose. Two libraries that share a root seed should each take a
+    /// [`Seed::child`] of it.
     Custom(u64),
 }
 
@@ -129,7 +130,7 @@ mod tests {
 
     #[test]
     fn streams_stay_what_they_were() {
-        // Recorded results come from these streams: the first number of each, seed 7, item 3.
+        // Recorded results depend on these streams. Seed 7, item 3, first number of each.
         let first = |purpose| Seed(7).stream(purpose, 3).next_u64();
         let all = [
             Purpose::World,

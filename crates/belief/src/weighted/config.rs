@@ -56,8 +56,8 @@ pub struct WeightedConfig {
     pub max_transitions: usize,
     /// Share of the particles below which the effective sample size makes the filter resample, in [0, 1]. 1 resamples in every update.
     pub resample_share: f64,
-    /// Share of the particles below which the effective sample size makes it temper, and which bridges then hold; at most
-    /// `resample_share`. 0 never tempers.
+    /// Share of the particles below which the effective sample size makes the filter temper. The bridges then keep it
+    /// there. At most `resample_share`; 0 never tempers.
     pub tempering_share: f64,
     /// Most bridges of a tempered update.
     pub max_bridges: usize,
@@ -69,11 +69,11 @@ pub struct WeightedConfig {
     pub structure_threshold: f64,
     /// Largest share of the simulated particles that outside proposals make up, in [0, 1). 0 ignores them.
     pub proposal_share: f64,
-    /// Most steps that the filter remembers for a restart. In a longer episode there is none.
+    /// Most steps that the filter remembers for a restart. A longer episode has no restart.
     pub history_limit: usize,
     /// Transitions that a restart may simulate. 0 forbids restarts.
     pub restart_transitions: usize,
-    /// Surprise above which the belief is taken for lost, nats (see [`pomdp::UpdateReport::surprise`]). Positive.
+    /// Surprise above which the belief counts as lost, nats (see [`pomdp::UpdateReport::surprise`]). Positive.
     pub restart_surprise: f64,
 }
 

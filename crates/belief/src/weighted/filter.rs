@@ -92,7 +92,7 @@ impl<M: Trackable> Updater<M> for WeightedFilter<'_, M> {
         let mut replayed = 0;
         if lost {
             restarted = self.restart(model, &mut replayed, rng);
-            // A restart that explains the latest observation no better than the old belief is none.
+            // A restart has to explain the latest observation better than the old belief does.
             if let (Some(new), Some(old)) = (&restarted, &advance)
                 && new.surprise >= old.surprise
             {

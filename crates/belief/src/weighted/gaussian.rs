@@ -6,7 +6,7 @@ use rand_distr::{Distribution as _, StandardNormal};
 /// Smallest share of a coordinate's variance that the coordinates before it may leave unexplained in a covariance that counts as regular.
 const REGULAR: f64 = 1e-9;
 
-/// Gaussian in d coordinates, of which some may be certain (variance 0).
+/// Gaussian in d coordinates. Some may be certain (variance 0).
 #[derive(Clone, Debug)]
 pub(crate) struct Gaussian {
     pub(crate) mean: Vec<f64>,
@@ -115,8 +115,8 @@ mod tests {
             -0.5 * quadratic - 0.5 * det.ln() - (2.0 * std::f64::consts::PI).ln()
         };
         assert!((fit.log_density(&[0.3, 2.0]) - direct(0.3, 2.0)).abs() < 1e-12);
-        // Null: the draws' second moments; n = 40,000, standard errors of variances √(2/n) and of the covariance at most √(2/n) of the
-        // geometric mean: tolerance 4 of them = 2.8 %.
+        // Null: the draws' second moments, n = 40,000. The relative standard error of a variance is √(2/n); that of the
+        // covariance is at most that of the geometric mean. Tolerance: 4 of them, 2.8 %.
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         let mut sums = [0.0; 3];
         for _ in 0..40_000 {

@@ -24,7 +24,7 @@ pub(crate) struct Prediction<M: StaticParameters> {
 }
 
 impl<M: StaticParameters> Prediction<M> {
-    /// Books of `states`; `weights` are positive and sum to 1.
+    /// Structures and parameters of `states`. `weights` are positive and sum to 1.
     pub(crate) fn new(model: &M, states: Vec<M::State>, weights: Vec<f64>) -> Self {
         let of_each: Vec<M::Structure> = states.iter().map(|s| model.structure(s)).collect();
         let mut structures = of_each.clone();
@@ -65,7 +65,7 @@ impl<M: StaticParameters> Prediction<M> {
         self.fits[kind].around(centre, scale, rng)
     }
 
-    /// The state drawn from its Liu–West kernel, and whether it differs from the one before: where no draw is possible it stays.
+    /// The state drawn from its Liu–West kernel, and whether it has changed. It stays the same if no draw is possible.
     pub(crate) fn smoothed(&self, model: &M, index: usize, (a, h): (f64, f64), rng: &mut Rng) -> (M::State, bool) {
         let state = &self.states[index];
         if h > 0.0 && !self.thetas[index].is_empty() {
@@ -118,8 +118,8 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// A state that the parameters `theta` may go with: drawn by weight and by nearness, so that what the belief knows of the rest of the
-    /// state, given the parameters, is kept.
+    /// A state to put the parameters `theta` on, drawn by weight and by nearness in the parameters. So the rest of the
+    /// state keeps what the belief says about it given the parameters.
     pub(crate) fn companion(&self, theta: &[f64], rng: &mut Rng) -> usize {
         let z = self.fit.whitened(theta, &self.fit.mean);
         let near = |(log_weight, other): (&f64, &Vec<f64>)| {

@@ -3,7 +3,7 @@
 use pomdp::{ObservationModel, Outcome, Purpose, Rng, Seed};
 use rayon::prelude::*;
 
-/// States that one task of the thread pool steps at least: a model of a few nanoseconds is not worth a task each.
+/// Fewest states per task of the thread pool. A step may take a few nanoseconds, too little for a task of its own.
 const STATES_PER_TASK: usize = 16;
 
 /// What became of one simulated state.
@@ -16,8 +16,8 @@ pub(crate) struct Simulated<S> {
     pub(crate) outcome: Outcome,
 }
 
-/// Runs `work` for every index with the stream of that index, on the threads of the current pool, and collects in order: the result
-/// does not depend on the number of threads.
+/// Runs `work` for every index on the threads of the current pool. Each index has its own stream and results come in
+/// order, so they do not depend on the number of threads.
 pub(crate) fn each<T: Send>(count: usize, rng: &mut Rng, work: impl Fn(usize, &mut Rng) -> T + Sync) -> Vec<T> {
     use rand::Rng as _;
     let base = Seed(rng.next_u64());

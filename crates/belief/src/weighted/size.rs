@@ -7,8 +7,9 @@ use rand::RngExt as _;
 
 use super::config::WeightedConfig;
 
-/// Particles that keep the Kullback–Leibler divergence to the binned distribution below `error` with the probability of the normal quantile
-/// `quantile`, where `bins` are occupied (Fox 2003, equation 12): the χ² quantile of Wilson and Hilferty over 2ε.
+/// Particles needed where `bins` cells are occupied (Fox 2003, equation 12). They keep the Kullback–Leibler divergence
+/// to the binned distribution below `error`, with the probability of the normal quantile `quantile`. It is the χ²
+/// quantile of Wilson and Hilferty over 2ε.
 pub(crate) fn kld_bound(bins: usize, error: f64, quantile: f64) -> f64 {
     if bins < 2 {
         return 1.0;
