@@ -8,8 +8,8 @@
 //!
 //! - What counts is what lies in the folder, never what the engine says of a task. A task that was killed, lost or played twice changes
 //!   only what is missing afterwards.
-//! - At most one array of a folder is queued: its name is made of the folder's path, so that a program started again, after a kill for
-//!   example, finds the array of before and waits for it instead of submitting another.
+//! - At most one array per folder is queued. Its name is made from the folder's path, so a program that is started
+//!   again finds the earlier array and waits for it.
 //! - [`Lock`] keeps two programs from submitting or merging in one folder at the same time. Workers take no lock.
 //!
 //! # Example

@@ -16,7 +16,7 @@ impl Lock {
     /// Takes the lock of the folder that `file` lies in. It lies on that file, one that is there as long as the folder is in use and is
     /// never replaced, such as `plan.json`: nothing is written to it.
     ///
-    /// On a file system without locks there is none: two programs at once then do work twice.
+    /// A file system without locks gives no lock. Two programs at once then do the work twice.
     ///
     /// # Errors
     ///

@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn goal_directed_episodes_bring_the_object_to_the_goal() {
-        // Worlds without obstacle; the heuristic policy pushes along whatever line it came on.
+        // Worlds without obstacle. The heuristic policy pushes along the line on which it reached the object.
         for robot in ["sawyer", "jaco"] {
             let reached = |share: &str| {
                 let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();

@@ -1,7 +1,7 @@
 //! Training data: randomised worlds, the heuristic policy, recorded transitions.
 //!
-//! Episode e of a dataset is a function of the scenario, the seed and e alone, so shards can be made in any order, on any number of
-//! workers, and give the same bytes.
+//! Episode e of a dataset is a function of the scenario, the seed and e alone. So shards can be made in any order and
+//! on any number of workers, with the same bytes.
 //!
 //! # Example
 //!

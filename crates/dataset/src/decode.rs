@@ -1,4 +1,4 @@
-//! Parquet bytes to header and columns, whatever the bytes are.
+//! Parquet bytes to header and columns. Any bytes give columns or an error.
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{ArrowPrimitiveType, Float32Type, Float64Type, Int8Type, UInt8Type, UInt32Type, UInt64Type};

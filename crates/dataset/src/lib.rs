@@ -8,10 +8,11 @@
 //!
 //! Invariants:
 //!
-//! - A shard is a function of its rows and its plan: the same rows give the same bytes, and nothing here reads a clock, a
-//!   random number or the machine. So the merged dataset does not depend on how many workers made it, or how often they died.
-//! - A published shard is never written again. Writers work on a hidden temporary file in the same folder, sync it, and
-//!   give it its name only if nobody else has; what a killed writer leaves behind is never read.
+//! - A shard is a function of its rows and its plan: the same rows give the same bytes. Nothing here reads a clock, a
+//!   random number or the machine. So the merged dataset does not depend on how many workers made it, or how often they
+//!   died.
+//! - A published shard is never written again. Writers work on a hidden temporary file in the same folder and sync it.
+//!   They give it its name only if no file has that name yet. What a killed writer leaves behind is never read.
 //! - Numbers survive bit for bit: observations and rewards as `f32`, states and Θ as `f64`. None of them is NaN or infinite.
 //! - The crate knows columns and names, no physics.
 //!

@@ -79,7 +79,7 @@ fn at<T>(values: &[T], row: usize, rows: usize) -> &[T] {
     &values[row * width..(row + 1) * width]
 }
 
-/// A finished dataset whose files are those of its manifest.
+/// A finished dataset whose files match its manifest.
 #[derive(Clone, Debug)]
 pub struct Reader {
     dir: PathBuf,

@@ -1,8 +1,8 @@
-//! A hash of the whole file inside the file, so that damage is found before the Parquet decoder, which has no checksums and
-//! panics on some damaged pages, sees a byte of it.
+//! A hash of the whole file inside the file. It finds damage before the Parquet decoder sees a byte: that decoder has
+//! no checksums and panics on some damaged pages.
 //!
-//! Parquet is `pages, footer, length of the footer, "PAR1"`, and the footer says where the pages are. So bytes between pages
-//! and footer are read by nobody: the seal lies there, and the file remains Parquet for every other reader.
+//! Parquet is `pages, footer, length of the footer, "PAR1"`, and the footer says where the pages are. So no reader
+//! looks at bytes between pages and footer. The seal lies there, and other readers still see a Parquet file.
 
 const MAGIC: &[u8; 8] = b"surmise1";
 pub(crate) const SEAL_LEN: usize = MAGIC.len() + blake3::OUT_LEN;

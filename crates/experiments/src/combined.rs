@@ -120,12 +120,14 @@ pub struct Comparison {
     pub first_only: u32,
     /// Worlds that only the second solved.
     pub second_only: u32,
-    /// Worlds that none solved.
+    /// Worlds that neither solved.
     pub neither: u32,
-    /// Two-sided: each world's number, whose worlds share their draws in all domains, has the sign of a coin for the sum of its differences (a sign-flip
-    /// test; on a single domain McNemar's exact one). Not corrected for the number of comparisons.
+    /// Two-sided p of a sign-flip test. Worlds of one number share their draws in all domains, so each number has one
+    /// sign for the sum of its differences. On a single domain this is McNemar's exact test. Not corrected for the
+    /// number of comparisons.
     pub p: f64,
-    /// McNemar's exact test of the counts above, two-sided (McNemar 1947): as if the worlds of several domains were independent.
+    /// Two-sided p of McNemar's exact test of the counts above (McNemar 1947). It treats worlds of several domains as
+    /// independent.
     pub mcnemar_p: f64,
 }
 
@@ -165,7 +167,7 @@ pub struct Common {
     pub version: u32,
     /// Root seed.
     pub seed: u64,
-    /// Whether budgets were those of a trial run.
+    /// Whether the budgets were those of `--quick`.
     pub quick: bool,
     /// Overrides of scenario entries for all runs.
     pub set: Vec<String>,

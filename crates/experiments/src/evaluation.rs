@@ -149,7 +149,7 @@ impl Evaluation {
     /// Where a file cannot be read or written.
     pub fn finish(&self, run: &Run) -> Result<Table, Error> {
         let s = &self.scenario;
-        // The published figures are those of the paper's own simulation.
+        // The published figures come from the paper's own simulation.
         let none = BTreeMap::<String, Published>::new();
         let published = if self.worlds.is_some() { &none } else { &s.evaluation.published };
         run.finish(&s.name, &s.robot.name, &s.preset, published)

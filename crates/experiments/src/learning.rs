@@ -86,8 +86,8 @@ pub(crate) struct Curve {
 
 /// Curves of every arm that has a belief in a world that knows its truth.
 ///
-/// A trial that has ended keeps its last belief, so that each step counts the same trials: else the curves would show, late in the
-/// episode, only the trials that have not solved the task.
+/// A trial that has ended keeps its last belief, so that each step counts the same trials. Otherwise late steps would
+/// show only the trials that have not solved the task.
 pub(crate) fn curves(parts: &[Part]) -> Vec<Curve> {
     let mut curves = Vec::new();
     for part in parts {

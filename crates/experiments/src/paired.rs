@@ -48,7 +48,7 @@ pub(crate) struct Cells {
 }
 
 impl Cells {
-    /// Two methods, of one run or of two, over the worlds that both have played: those of the same number.
+    /// Two methods, from one run or two, over the worlds that both have played. Equal numbers are equal worlds.
     pub(crate) fn of(first: (&Trials, Method), second: (&Trials, Method)) -> Self {
         let mut cells = Self::default();
         for ((_, trial), one) in first.0.range((first.1, 0)..=(first.1, u32::MAX)) {
@@ -79,13 +79,13 @@ impl Cells {
         }
     }
 
-    /// Two-sided p of the hypothesis that both are as good: in each world, whatever number of domains it is played in, the sign of the difference
-    /// is the toss of a coin. Of one domain this is McNemar's exact test.
+    /// Two-sided p of a sign-flip test. Null: both are equally good, so each world's sum of differences over its
+    /// domains has a random sign. For one domain this is McNemar's exact test.
     pub(crate) fn p(&self) -> f64 {
         sign_flip(self.nets.values().copied())
     }
 
-    /// McNemar's exact test of the counts, two-sided, whatever worlds share.
+    /// Two-sided p of McNemar's exact test of the counts. It ignores what worlds share.
     pub(crate) fn mcnemar_p(&self) -> f64 {
         let signs = [(self.first_only, -1), (self.second_only, 1)];
         sign_flip(signs.into_iter().flat_map(|(count, sign)| std::iter::repeat_n(sign, count as usize)))

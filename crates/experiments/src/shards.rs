@@ -28,8 +28,9 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// The shard, of `of`, that plays trial `trial` of method number `method` of `methods`: trials go round, and each method begins
-    /// elsewhere, so that shards get the same share of slow methods and fast ones, and of few trials each another.
+    /// The shard, below `of`, that plays trial `trial` of method number `method` of `methods`. Trials go round the
+    /// shards, and each method starts at another one. So each shard gets the same share of slow and fast methods, also
+    /// with few trials.
     pub(crate) fn of_item(trial: u32, method: usize, methods: usize, of: u32) -> Self {
         let start = method as u64 * (of as usize).div_ceil(methods.max(1)) as u64;
         Self { index: ((u64::from(trial) + start) % u64::from(of.max(1))) as u32, of }

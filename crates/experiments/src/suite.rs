@@ -28,7 +28,7 @@ pub struct SuiteRequest {
     pub seed: u64,
     /// Small budgets.
     pub quick: bool,
-    /// Whether runs that are finished count as they are where another commit played them: the tables say which.
+    /// Whether finished runs of another commit count too. The tables name the commit.
     pub keep_finished: bool,
     /// Overrides of scenario entries for all runs, after their own.
     pub set: Vec<String>,
@@ -136,7 +136,7 @@ impl Suite {
             if parts.iter().all(|part| part.included) {
                 continue;
             }
-            // Those of other tables first: they are what the others are compared with.
+            // Runs of other tables first: the others are compared with them.
             parts.sort_by_key(|part| !part.included);
             let combined = Combined::new(table, &parts, missing, &self.common);
             self.write_table(table, &combined, &parts)?;

@@ -16,7 +16,7 @@ use crate::{Error, Worlds};
 pub struct TrialRecord {
     /// Method.
     pub method: Method,
-    /// Number of the trial, from 0; the same number means the same world for every method.
+    /// Number of the trial, from 0. Equal numbers are equal worlds, for every method.
     pub trial: u32,
     /// Seed of the trial.
     pub seed: u64,

@@ -16,8 +16,9 @@ pub struct Figure {
     pub panels: Vec<Panel>,
     /// Panels a row.
     pub columns: usize,
-    /// Mean width and height of panels with their labels. The figure is `columns` times as wide and, without title and
-    /// legend, as many times as high as it has rows; within, what labels leave is divided evenly between the plots.
+    /// Mean width and height of panels with their labels. The figure is `columns` times as wide as one panel. Without
+    /// title and legend its height is that of one panel times the number of rows. The space that labels leave is
+    /// divided evenly between the plots.
     pub panel_size_px: (u32, u32),
     /// Series that take the first colours, whether they are drawn or not: so that a method has one colour in several
     /// figures. The others follow in order of appearance.

@@ -222,8 +222,8 @@ pub struct Heat {
     pub values: Vec<Vec<f64>>,
     /// Values of the lightest and the darkest colour; from the data where `None`.
     pub limits: Option<(f64, f64)>,
-    /// Digits after the point of the numbers in the cells; none are shown for `None`, and beside the cells a bar tells
-    /// the colours' values, as it does where numbers do not fit.
+    /// Digits after the point of the numbers in the cells. With `None`, or where numbers do not fit, a bar beside the
+    /// cells explains the colours.
     pub digits: Option<usize>,
     /// What the values are, for that bar; may be empty.
     pub value_label: String,

@@ -1,7 +1,7 @@
 //! The bundled font: how wide a text is, how it breaks into lines, and its glyphs for the bitmap.
 //!
-//! plotters' own use of `ab_glyph` (0.3.7) drops each glyph's left bearing and scales by another factor than its SVG, so
-//! letters stand unevenly and PNG and SVG differ; the trait below is the place that its backends offer to do otherwise.
+//! plotters 0.3.7 drops each glyph's left bearing in its own use of `ab_glyph`, and scales by another factor than in
+//! its SVG. So letters stand unevenly, and PNG and SVG differ. The trait below replaces that drawing.
 
 use std::convert::Infallible;
 use std::sync::LazyLock;

@@ -45,7 +45,7 @@ pub struct Header {
     pub robot: Robot,
     /// Time between rows, s, nominally: rows may be missing.
     pub period_secs: f64,
-    /// Radius of the ball that is the tool, m. Given if `robot` is none and there is a tool.
+    /// Radius of the ball that is the tool, m. Required if `robot` is "none" and there is a tool.
     pub tool_radius_m: Option<f64>,
     /// Coefficient of friction of the contact pair tool–object.
     pub tool_friction: Option<Number>,

@@ -37,8 +37,8 @@ impl From<Problem> for Failure {
 
 /// Reads all rows.
 pub(crate) fn decode(bytes: Bytes, robot: Robot) -> Result<Vec<Episode>, Failure> {
-    // parquet 60.1 panics on some damaged pages (one of 8000 mutated files: a page of a dictionary that is not there), where it should
-    // return an error; that must not end the program.
+    // parquet 60.1 panics on some damaged pages where it should return an error, for example if a dictionary page is
+    // missing. That must not end the program.
     let result = whole_file::caught(|| decode_trusting(bytes, robot));
     result.unwrap_or_else(|| Err(Failure::Parquet("a page contradicts its header".into())))
 }

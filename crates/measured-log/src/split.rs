@@ -24,8 +24,9 @@ impl Log {
         Split::of(&order, 0..held_out(self.header.split.holdout_fraction, order.len()))
     }
 
-    /// The split of cross-validation that holds out part `part` of `parts`, counted from 0: episodes in the order of [`Self::split`]'s tickets, cut into
-    /// parts whose lengths differ by one at most. Nothing is held out of a part that does not exist.
+    /// The split of cross-validation that holds out part `part` of `parts`, counted from 0. Episodes are ordered by
+    /// [`Self::split`]'s tickets and cut into parts whose lengths differ by at most one. Nothing is held out of a part
+    /// that does not exist.
     #[must_use]
     pub fn fold(&self, seed: u64, part: usize, parts: usize) -> Split {
         let order = self.shuffled(seed);

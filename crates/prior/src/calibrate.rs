@@ -56,8 +56,9 @@ struct Record {
 /// Runs the models over every episode and compares with the truth; `static_columns` are the continuous targets that stay the same
 /// in an episode.
 ///
-/// The rank of a target that does not always apply (the size of an obstacle that may be absent) is taken given that it applies: that
-/// each class has a label with which it was seen to apply. Components without it say nothing of its value.
+/// Some targets do not always apply, such as the size of an obstacle that may be absent. Their rank is conditional on
+/// applying: each class has a label with which the target was seen to apply. Components without it say nothing of its
+/// value.
 #[must_use]
 pub fn calibrate(
     models: Models<'_>,

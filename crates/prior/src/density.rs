@@ -11,8 +11,9 @@ use crate::{Draw, Layout, Mixture};
 /// Places of the obstacle's x, y and the z part of its quaternion among the values of a body.
 const PLANE: [usize; 3] = [0, 1, 5];
 
-/// A draw as it is, for a filter that knows its density: what no body can have becomes NaN, so that it counts as impossible instead of
-/// being moved to the nearest possible value, which would change the density. Of the state only the obstacle's pose in the plane is kept.
+/// An unchanged draw, for a filter that knows its density. An impossible value becomes NaN, so that the draw counts as
+/// impossible. Moving it to the nearest possible value would change the density. Of the state only the obstacle's pose
+/// in the plane is kept.
 #[must_use]
 pub fn raw_particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: usize, table_height_m: f64) -> Particle {
     let plain = layout.invert(&draw.values, observation);
@@ -21,7 +22,8 @@ pub fn raw_particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: u
     if !(0.0..=1.0).contains(&theta.object.friction) {
         theta.object.friction = f64::NAN;
     }
-    // The frame of a sphere has its centre of mass below the centre; a draw above it is none that was learnt.
+    // In the frame of a sphere the centre of mass lies below the centre. The network has never seen one above, so such
+    // a draw is impossible.
     if theta.object.shape == ObjectShape::Sphere && targets[3] > 0.0 {
         theta.object.com_m[2] = f64::NAN;
     }
@@ -41,8 +43,8 @@ pub fn raw_particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: u
     Particle::new(state, theta)
 }
 
-/// ln q of a particle's static parameters under `mixture`: probability of its shapes times the density of its parameters in the
-/// coordinates that `PushModel` gives them as [`pomdp::StaticParameters`], all else integrated out.
+/// ln q of a particle's static parameters under `mixture`, with all else integrated out. q is the probability of its
+/// shapes times the density of its parameters, in the coordinates of `PushModel`'s [`pomdp::StaticParameters`].
 ///
 /// The mixture is one over written targets y; with coordinates x the density is that of y(x) times |dy/dx|. Sizes come first in the
 /// order of elimination, then the centre of mass, whose bounds depend on them: the Jacobian is triangular.

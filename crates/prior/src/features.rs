@@ -4,11 +4,11 @@
 //! of the object, shape of the obstacle or none. Values that do not apply (sizes of a sphere beyond its radius, anything of an absent
 //! obstacle) are masked out of the loss.
 //!
-//! The published network is told no more of its targets than that. Here a target that a sensor measures is learnt as its difference from
-//! the measurement, a mass as its logarithm, sizes as extents (width, depth, height), which mean nearly the same for every shape, so that
-//! ten components need not be spent on telling a radius from a side, and a value of the state only down to a resolution: a body at rest
-//! has velocity 0 to the last bit, and a density that may grow there without bound would be all that a likelihood rewards. Noise of the
-//! size of the resolution is added to the targets, so that a calibrated network states at least that spread.
+//! The published network uses these targets as they are. Here a measured target is learnt as its difference from the
+//! measurement, and a mass as its logarithm. Sizes are extents (width, depth, height), which mean nearly the same for
+//! every shape: no component is spent on telling a radius from a side. Values of the state have a resolution. A body at
+//! rest has velocity exactly 0, and without a resolution the density could grow there without bound. Noise of the size
+//! of the resolution is added to the targets, so a calibrated network states at least that spread.
 
 #[cfg(feature = "training")]
 mod episodes;
@@ -166,9 +166,10 @@ fn from_names(
     Layout { robot: robot.into(), observation, continuous, transforms, classes: classes.collect() }
 }
 
-/// A draw made after `observation` as a hypothesis on the table at `table_height_m`, inside the physical ranges: friction in [0, 1],
-/// positive masses and sizes, centre of mass inside the shape. A body drawn nearly upright and nearly resting is put upright and at rest
-/// height, because the mixture's components are diagonal and cannot hold height and size together.
+/// A draw made after `observation`, as a particle on the table at `table_height_m`. It is moved into the physical
+/// ranges: friction in [0, 1], positive masses and sizes, centre of mass inside the shape. A body drawn nearly upright
+/// and nearly resting is put upright and at rest height, because the mixture's components are diagonal and cannot hold
+/// height and size together.
 #[must_use]
 pub fn particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: usize, table_height_m: f64) -> Particle {
     let plain = layout.invert(&draw.values, observation);

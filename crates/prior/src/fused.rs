@@ -4,8 +4,8 @@
 //! nothing else that is not element by element. It works on plain vectors and is generic over f32 (training) and f64
 //! (finite differences). A test holds it to the gradients of [`crate::network`].
 //!
-//! The same seed gives the same bytes for any number of threads on one kind of CPU; `gemm` picks its kernels by the CPU's
-//! vector units (FMA, AVX-512), so another kind rounds differently.
+//! On one kind of CPU the same seed gives the same bytes for any number of threads. `gemm` picks its kernels by the
+//! CPU's vector units (FMA, AVX-512), so another kind of CPU rounds differently.
 
 mod batch;
 mod head;

@@ -4,26 +4,29 @@
 //! [`Checkpoint`](checkpoint::Checkpoint), one folder on disk; [`Inference`](inference::Inference) reads it, takes one
 //! observation at a time and returns a [`Mixture`](mixture::Mixture) that can be sampled and evaluated.
 //!
-//! One set of weights, three ways to run it, held to each other by tests: [`network`] in burn with autodiff, the reference;
-//! [`fused`] by hand on packed batches, for training; [`inference`] on plain slices, one step at a time.
+//! One set of weights runs in three ways, and tests compare them. [`network`] in burn with autodiff is the reference.
+//! [`fused`] computes gradients by hand on packed batches, for training. [`inference`] takes plain slices, one step at
+//! a time.
 //!
 //! # What was decided, and why
 //!
 //! The paper gives the network (LSTM 2 × 128, tanh, ten diagonal components, Adam with 0.001, batches of 128) and the loss. The rest:
 //!
-//! - **Targets** ([`features`], [`Transform`]): what is measured as the difference from the measurement, masses as logarithms, sizes as extents, states
-//!   down to a resolution. With plain targets the likelihood was spent on velocities that are 0 and on positions that were measured
-//!   anyway: the right shape at the end of 58 % of the held-out episodes, positions 3 cm off. Now 90 % and 3 mm.
+//! - **Targets** ([`features`], [`Transform`]): measured values as the difference from the measurement, masses as
+//!   logarithms, sizes as extents, states down to a resolution. With plain targets the likelihood is dominated by
+//!   velocities that are 0 and by positions that are measured anyway. The right shape at the end of a held-out episode
+//!   rises from 58 to 90 %; the position error falls from 3 cm to 3 mm.
 //! - **Inputs**: median and quartiles, then asinh. Scaled by the standard deviation, a blocked push of 100 N hides the 2 N of a free one.
-//! - **The obstacle** is felt through the object alone: the shipped Sawyer's prior finds it in 84.6 ± 0.8 % of the episodes that touched it and denies it in
-//!   64.6 % of those without one; an LSTM trained for nothing else reached 82 to 90 % and 75 to 55 % on the same kind of data. The Jaco, whose hand
-//!   holds the object, does better.
-//! - **The action** is an optional input (`train --action-input`), off as published: with it the Sawyer's prior gains 0.2 nats a step and finds 85.1 % of
-//!   the obstacles touched, denies 68.3 % of those that are not there. The shipped ones do without, for both presets share them.
+//! - **The obstacle** is felt through the object alone. The shipped Sawyer prior finds it in 84.6 ± 0.8 % of the
+//!   episodes that touched it, and denies it in 64.6 % of those without one. An LSTM trained only for this reached 82
+//!   to 90 % and 75 to 55 %. The Jaco does better, as its hand holds the object.
+//! - **The action** is an optional input (`train --action-input`), off as published. With it the Sawyer prior gains 0.2
+//!   nats per step. The shipped priors do without, because both presets share them.
 //! - **Dropout** 0.1 on the output of each layer, by held-out likelihood at epoch 100: −117.85, −118.29, −118.20 nats a step for 0, 0.1, 0.2.
 //!   A cosine schedule instead of a constant rate.
-//! - **One factor a target** on the stated spread, fitted on the held-out part ([`TrainConfig::rescale`]): early stopping leaves a network too sure of what it
-//!   has learnt by heart. Calibration is measured on other data, of another seed.
+//! - **One factor per target** scales the stated spread, fitted on the held-out part ([`TrainConfig::rescale`]): a
+//!   network that fits its training data well is overconfident. Calibration is measured on other data, from another
+//!   seed.
 //! - **Suggestions as proposals** ([`density`]): their density in the coordinates of the belief filter.
 //!
 //! # Example

@@ -8,8 +8,8 @@ const QUARTILES: f64 = 1.349;
 
 /// Below this fraction of (1 + |mean|) a column counts as constant and keeps its unit.
 ///
-/// Dividing a constant (the angular velocity of a fixed obstacle, the z part of a quaternion in the plane) by its rounding
-/// noise would turn that noise into a signal and the density into an arbitrarily high spike.
+/// Some columns are constant, such as the angular velocity of a fixed obstacle. Dividing them by their rounding noise
+/// would turn noise into a signal, and the density into an arbitrarily high spike.
 const CONSTANT: f64 = 1e-6;
 
 /// Centre and spread of a column.
@@ -28,9 +28,9 @@ impl Scale {
         self.mean.is_finite() && self.stddev.is_finite() && self.stddev > 0.0
     }
 
-    /// Median and interquartile range (as the standard deviation of the Gaussian that has it): the scale of what is usual, where a
-    /// blocked push reads a hundred times the force of a free one. A column of which three quarters are equal falls back on
-    /// [`Scale::fit`].
+    /// Median and interquartile range, the latter as the standard deviation of the Gaussian that has it. This is the
+    /// scale of usual values: a blocked push reads a hundred times the force of a free one. A column with three
+    /// quarters of equal values falls back on [`Scale::fit`].
     #[must_use]
     pub fn robust(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
@@ -105,8 +105,8 @@ impl Normalisation {
         normalised
     }
 
-    /// Mean over the steps of `sequences` of Σ ln stddev over the targets that apply: what has to be added to a negative
-    /// log-likelihood of normalised targets to have it in original units.
+    /// Σ ln stddev over the targets that apply, averaged over the steps of `sequences`. Add it to a negative
+    /// log-likelihood of normalised targets to get original units.
     #[must_use]
     pub fn mean_log_scale(&self, sequences: &[&Sequence]) -> f64 {
         let log_scales: Vec<f64> = self.continuous.iter().map(|scale| scale.stddev.ln()).collect();

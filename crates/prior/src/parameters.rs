@@ -204,8 +204,8 @@ impl<T: Copy + Default> Parameters<T> {
 }
 
 impl Parameters<f32> {
-    /// Fresh weights: uniform in ±1/√width, forget gates open (bias + 1, Jozefowicz et al. 2015), means of the components
-    /// spread over ±1 normalised units so that they start as different hypotheses, all scales at 1, all classes equal.
+    /// Fresh weights, uniform in ±1/√width. Forget gates are open (bias + 1, Jozefowicz et al. 2015). Means of the
+    /// components are spread over ±1 normalised units, so that they start apart. All scales are 1, all classes equal.
     #[must_use]
     pub fn initial(dimensions: &Dimensions, seed: Seed) -> Self {
         let mut parameters = Self::zeros(dimensions);

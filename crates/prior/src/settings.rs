@@ -36,8 +36,8 @@ pub struct TrainConfig {
     pub schedule: Schedule,
     /// Sequences per optimiser step.
     pub batch: usize,
-    /// Parts that a batch is dealt into for the fused gradient, whose sums are added in this order: at least the number of
-    /// cores to use, and part of the result, while the number of threads is not.
+    /// Parts of a batch for the fused gradient, at least the number of cores to use. Their sums are added in order, so
+    /// this number changes the rounding of the result. The number of threads does not.
     pub chunks: usize,
     /// Share of the episodes held out, in (0, 1).
     pub held_out: f64,

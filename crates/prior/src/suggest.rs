@@ -49,8 +49,8 @@ impl Suggester {
         Some(features::particle(&self.layout, &mixture.sample(rng), observation, self.joints, table_height_m))
     }
 
-    /// A draw for a filter that weighs it by [`Self::log_density`]: not moved into the physical ranges, so that it may be no possible
-    /// world; of its state only a fixed obstacle's pose counts. `None` before the first observation.
+    /// A draw for a filter that weighs it by [`Self::log_density`]. It is not moved into the physical ranges, so it may
+    /// be impossible. Only a fixed obstacle's pose is used from its state. `None` before the first observation.
     pub fn sample_raw(&self, table_height_m: f64, rng: &mut Rng) -> Option<Particle> {
         let (mixture, observation) = self.latest.as_ref()?;
         Some(density::raw_particle(&self.layout, &mixture.sample(rng), observation, self.joints, table_height_m))

@@ -131,7 +131,7 @@ impl Place<'_> {
     }
 }
 
-/// Calls `leaf` for every value that is no table and no list of tables or lists.
+/// Calls `leaf` for every value except tables and lists of tables or lists.
 fn leaves(place: &Place<'_>, path: &str, value: &Value, leaf: &mut impl FnMut(&str, &Value, &Place<'_>)) {
     match value {
         Value::Table(table) if !table.is_empty() => {

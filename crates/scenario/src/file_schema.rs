@@ -16,8 +16,8 @@ pub enum FileKind {
     Robot,
 }
 
-/// JSON Schema (draft 7) of scenario files. Layers merge table by table, so that no key of a table is required; what replaces as a whole has
-/// to be whole: elements of lists, and choices such as `planner.budget`.
+/// JSON Schema (draft 7) of scenario files. Layers merge table by table, so no key of a table is required. Elements of
+/// lists and choices such as `planner.budget` replace as a whole, so they must be complete.
 #[must_use]
 pub fn file_schema(kind: FileKind) -> Value {
     let whole = resolved();
@@ -115,7 +115,7 @@ impl Partial<'_> {
     }
 }
 
-/// Name of a type of which a layer may hold a part.
+/// Name of a type that a layer may hold in part.
 fn part(name: &str) -> String {
     format!("{name}Part")
 }

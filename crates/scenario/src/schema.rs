@@ -89,7 +89,7 @@ pub enum Filter {
     Weighted,
 }
 
-/// Filters of the belief: all are set, one is used.
+/// Filters of the belief. All have settings; `filter` says which one runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BeliefConfig {
@@ -121,7 +121,7 @@ impl BeliefConfig {
     }
 }
 
-/// What the initial belief says of the obstacle.
+/// What the initial belief says about the obstacle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum InitialObstacle {
@@ -155,10 +155,10 @@ pub struct AgentConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Rollouts {
-    /// The tool goes to the object's centre, as published; a cut rollout is worth nothing more.
+    /// The tool goes to the object's centre, as published. What follows a cut rollout counts as 0.
     Heuristic,
-    /// [`physics_model::GoalPolicy`], which pushes to the goal past the obstacle that its particle believes in; a cut rollout is worth what
-    /// its leaf value says.
+    /// [`physics_model::GoalPolicy`]: pushes to the goal, past the obstacle of its particle. What follows a cut rollout
+    /// counts as the policy's leaf value.
     Goal,
 }
 
@@ -168,7 +168,7 @@ pub enum Rollouts {
 pub struct DataConfig {
     /// Share of the episodes in which the obstacle can move.
     pub movable_share: f64,
-    /// Actions in an episode; fewer where the world diverges. Reaching the goal does not end it.
+    /// Actions in an episode; fewer if the world diverges. Reaching the goal does not end it.
     pub episode_actions: usize,
     /// Share of the episodes played by [`physics_model::GoalPolicy`], the others by the heuristic policy.
     pub goal_share: f64,

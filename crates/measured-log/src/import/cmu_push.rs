@@ -20,14 +20,14 @@ const GRAVITY_MPS2: f64 = 9.81;
 /// From the right angle to the centre of the shape: the centroid at half height, mm.
 const CENTRE_MM: [f64; 3] = [50.0, 50.0, 25.0];
 
-/// Pushes of an aluminium triangle by a robot's point finger (Zhou, Paolini, Bagnell, Mason, ICRA 2016; github.com/robinzhoucmu/MLab_EXP,
-/// PushExp/sensor_log, Apache-2.0) from `source`: one text file, plain or gzip, whose name or folder holds the feet in mm as
-/// `x1_x2_x3_y1_y2_y3`, or `patch` for a triangle that lies on its face. `friction_force_n` is the force of friction between triangle and
-/// board: [`HARD_BOARD_N`], or that of another board.
+/// Pushes of an aluminium triangle by a robot's point finger (Zhou, Paolini, Bagnell, Mason, ICRA 2016;
+/// github.com/robinzhoucmu/MLab_EXP, PushExp/sensor_log, Apache-2.0). `source` is one text file, plain or gzip. Its
+/// name or folder holds the feet in mm as `x1_x2_x3_y1_y2_y3`, or `patch` for a triangle that lies on its face.
+/// `friction_force_n` is the force of friction between triangle and board: [`HARD_BOARD_N`], or that of another board.
 ///
-/// Each row is a moment when the force sensor or the robot was read, so no reading is resampled. The object's pose is known before (first
-/// row) and after the push (last row, though the cameras looked later, when the robot was away). The first force is subtracted as the
-/// authors do, and forces are turned from the axes of the sensor to those of the base.
+/// Each row is a moment when the force sensor or the robot was read, so no reading is resampled. The object's pose is
+/// known before (first row) and after the push (last row, though the cameras looked later, when the robot was away).
+/// The first force is subtracted as the authors do, and forces are turned from sensor axes to base axes.
 ///
 /// # Errors
 ///
@@ -241,9 +241,9 @@ fn yaw(tool: &[f64; 7]) -> f64 {
     2.0 * tool[6].atan2(tool[3])
 }
 
-/// Force of the object on the tool in base axes from one in the axes of the sensor, which is mounted at 45 degrees and left-handed in the
-/// plane: `R_tool` and the turn by the robot's pose of the authors' `ExtractFromLog.m` and `ComputeWrench.m`, whose sign for the object is
-/// the opposite one.
+/// Force of the object on the tool, turned from sensor axes to base axes. The sensor is mounted at 45 degrees and is
+/// left-handed in the plane. This is `R_tool` and the turn by the robot's pose in the authors' `ExtractFromLog.m` and
+/// `ComputeWrench.m`, which give the force on the object: the opposite sign.
 fn on_tool([fx, fy]: [f64; 2], yaw: f64) -> [f64; 2] {
     let s = std::f64::consts::FRAC_1_SQRT_2;
     let [x, y] = [s * (fx + fy), s * (fx - fy)];

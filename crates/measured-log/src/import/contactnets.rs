@@ -29,9 +29,10 @@ const COLUMNS: [&str; 15] = [
     "wz_body_rps",
 ];
 
-/// Tosses of an acrylic cube onto a wooden board (Pfrommer, Halm, Posa: "ContactNets", CoRL 2020; github.com/DAIRLab/contact-nets,
-/// BSD-3-Clause) from `source`: a table with the columns `toss, t_s, x_m, …, wz_body_rps`, or a folder with one `tosses_*.csv`. The
-/// angular velocity is turned from body to world axes; all else is copied.
+/// Tosses of an acrylic cube onto a wooden board (Pfrommer, Halm, Posa: "ContactNets", CoRL 2020;
+/// github.com/DAIRLab/contact-nets, BSD-3-Clause). `source` is a table with the columns `toss, t_s, x_m, …,
+/// wz_body_rps`, or a folder with one `tosses_*.csv`. The angular velocity is turned from body to world axes; all else
+/// is copied.
 ///
 /// # Errors
 ///

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Negative log-likelihoods of the same values, nats a step, of the targets as they are written.
+/// Negative log-likelihoods of the same values, nats per step, for the targets as written in the dataset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Likelihoods {
@@ -114,8 +114,8 @@ pub struct Calibration {
     pub static_targets: Vec<String>,
     /// Accuracy of the first class target at the last step of each episode.
     pub shape_accuracy: Option<f64>,
-    /// Of the first class target with a label `none`: share of the episodes in which something touched the obstacle that end with
-    /// more than half of the probability on "something is there".
+    /// For the first class target with a label `none`: share of the episodes with an obstacle contact that end with
+    /// P(obstacle) above one half.
     pub obstacle_after_contact_accuracy: Option<f64>,
     /// Episodes of that share.
     pub obstacle_contact_episodes: usize,

@@ -52,7 +52,7 @@ pub fn layout_of_dataset(schema: &Schema, input: ActionInput) -> Result<Layout, 
 ///
 /// # Panics
 ///
-/// If the episode's columns are not those of [`layout_of_dataset`].
+/// If the episode's columns differ from [`layout_of_dataset`].
 pub fn sequence(layout: &Layout, episode: &Episode) -> Result<Sequence, Error> {
     for (target, &found) in layout.classes.iter().zip(&episode.classes) {
         if usize::from(found) >= target.labels.len() {

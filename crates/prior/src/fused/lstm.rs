@@ -175,8 +175,8 @@ fn activate<T>(
 }
 
 wide! {
-/// Gradients of the gates before activation (in place of the gates), and of the cell one step earlier (in place of
-/// `cell_gradient`, which holds what flows back from the step after); all `[alive, …]`.
+/// Writes the gradients of the gates before activation in place of the gates. Writes the gradient of the cell one step
+/// earlier in place of `cell_gradient`, which holds the gradient from the next step. All are `[alive, …]`.
 fn deactivate<T>(
     width: usize,
     gates: &mut [T],

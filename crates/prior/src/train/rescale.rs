@@ -1,5 +1,5 @@
-//! One factor on the stated spread of each target, fitted on held-out episodes: a network that was stopped when its likelihood was best is
-//! still too sure of what it has learnt by heart.
+//! One factor on the stated spread of each target, fitted on held-out episodes. A network stopped at its best
+//! likelihood is still overconfident.
 
 use rayon::prelude::*;
 
