@@ -18,6 +18,9 @@ fn browser() -> Option<&'static str> {
     found
 }
 
+/// Width of a telephone, pixels.
+const NARROW: u32 = 420;
+
 /// Ends of figures without and with a caption.
 const PLAIN: &str = "</svg></figure>";
 const CAPTIONED: &str = "</figcaption></figure>";
@@ -26,7 +29,7 @@ const CAPTIONED: &str = "</figcaption></figure>";
 fn browse(browser: &str, options: &[&str], page: &Path) -> String {
     let profile = tempfile::tempdir().unwrap();
     let output = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1100,1600"])
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"])
         // Whoever asks the network for something would fail here.
         .args(["--host-resolver-rules=MAP * ~NOTFOUND", "--disable-background-networking"])
         .arg(format!("--user-data-dir={}", profile.path().display()))
@@ -52,7 +55,7 @@ fn ink(picture: &Path) -> (f64, u32, u32) {
 
 /// `end`: what each figure ends with.
 fn check(browser: &str, page: &Path, sections: &[&str], figures: usize, end: &str) {
-    let dom = browse(browser, &["--dump-dom"], page);
+    let dom = browse(browser, &["--window-size=1100,1600", "--dump-dom"], page);
     for id in sections {
         assert!(dom.contains(&format!("<section id=\"{id}\">")), "{}: no section {id}", page.display());
     }
@@ -61,10 +64,30 @@ fn check(browser: &str, page: &Path, sections: &[&str], figures: usize, end: &st
     assert_eq!(dom.matches(end).count(), figures, "{}", page.display());
     assert_eq!(dom.matches("<section").count(), sections.len(), "{}", page.display());
     let picture = page.with_extension("png");
-    browse(browser, &[&format!("--screenshot={}", picture.display())], page);
+    browse(browser, &["--window-size=1100,1600", &format!("--screenshot={}", picture.display())], page);
     let (ink, width, height) = ink(&picture);
     assert_eq!((width, height), (1100, 1600));
     assert!(ink > 0.02 && ink < 0.98, "{}: {ink} of the pixels are drawn on", page.display());
+    check_narrow(browser, page);
+}
+
+/// On a telephone a page is read by scrolling down alone; only tables scroll sideways, in boxes of their own.
+fn check_narrow(browser: &str, page: &Path) {
+    // Windows have a least width, frames have not; a frame made of text may be looked into, and pages themselves have no scripts.
+    let text = std::fs::read_to_string(page).unwrap().replace('&', "&amp;").replace('"', "&quot;");
+    let look =
+        "document.title = this.contentWindow.innerWidth + ' ' + this.contentDocument.documentElement.scrollWidth";
+    let frame = format!(
+        "<!DOCTYPE html><title></title><iframe style=\"border:0;width:{NARROW}px;height:900px\" onload=\"{look}\" srcdoc=\"{text}\"></iframe>"
+    );
+    let framed = page.with_extension("narrow.html");
+    std::fs::write(&framed, frame).unwrap();
+    let dom = browse(browser, &["--dump-dom"], &framed);
+    let title = dom.split_once("<title>").and_then(|(_, rest)| rest.split_once("</title>")).expect("a title").0;
+    let widths: Vec<u32> = title.split(' ').map(|width| width.parse().expect("a width")).collect();
+    let [inner, content] = widths[..] else { panic!("{title}") };
+    assert_eq!(inner, NARROW, "the frame is as wide as it was asked to be");
+    assert!(content <= inner, "{}: {content} of {inner} pixels: it scrolls sideways", page.display());
 }
 
 /// A page of `diagnose` has all its parts and at least three figures, and is drawn.
@@ -85,18 +108,20 @@ fn the_pages_of_runs_and_episodes_are_whole_in_a_browser() {
         assert!(output.status.success(), "{}", stderr(&output));
     };
     report(&root().join("assets/results/table1-surmise-D4"), "run.html");
-    let sections = ["success", "pictures", "failures", "pairs", "trials", "source"];
+    let sections = ["success", "pictures", "failures", "pairs", "trials", "source", "words"];
     check(browser, &page("run.html"), &sections, 3, PLAIN);
 
     report(&root().join("assets/results"), "all.html");
     let figures = std::fs::read_to_string(page("all.html")).unwrap().matches("<figure").count();
     assert!(figures >= 5, "{figures}");
-    check(browser, &page("all.html"), &["table1", "table2", "ablation"], figures, PLAIN);
+    check(browser, &page("all.html"), &["table1", "table2", "ablation", "words"], figures, PLAIN);
 
     let demo = program("demo").args(["--domain", "D4", "--quick", "--out"]).arg(page("demo")).output().unwrap();
     assert!(demo.status.success(), "{}", stderr(&demo));
-    let sections = ["above", "belief", "steps", "source"];
+    let sections = ["above", "belief", "steps", "source", "words"];
     check(browser, &page("demo").join("episode.html"), &sections, 1, PLAIN);
-    let (ink, ..) = ink(&page("demo").join("episode.png"));
-    assert!(ink > 0.02 && ink < 0.5, "{ink} of the picture's pixels are drawn on");
+    for (name, most) in [("episode.png", 0.5), ("animation.png", 0.98)] {
+        let (ink, ..) = ink(&page("demo").join(name));
+        assert!(ink > 0.02 && ink < most, "{name}: {ink} of the picture's pixels are drawn on");
+    }
 }

@@ -101,6 +101,16 @@ impl Words {
         html! { a.word href={ "#word-" (word.anchor()) } title=(word.means) { (shown) } }
     }
 
+    /// Marked where the glossary has it, else as plain text: for names from files.
+    #[must_use]
+    pub fn mark_known(&self, shown: &str) -> Markup {
+        if word(shown).is_some() {
+            self.mark(shown)
+        } else {
+            html! { (shown) }
+        }
+    }
+
     /// The marked words with their meanings, in alphabetical order, for the foot of the page.
     #[must_use]
     pub fn list(&self) -> Markup {

@@ -6,7 +6,8 @@
 //!
 //! # Example
 //! ```
-//! use page::{Words, document, facts, html, section};
+//! use maud::html;
+//! use page::{Words, document, facts, section};
 //!
 //! let words = Words::default();
 //! let body = html! {
@@ -27,8 +28,10 @@ use std::fs::File;
 use std::io::{ErrorKind, Read as _};
 use std::path::Path;
 
+use maud::{PreEscaped, html};
+
 pub use glossary::{Topic, Word, Words, glossary, word};
-pub use maud::{Markup, PreEscaped, Render, html};
+pub use maud::{Markup, Render};
 
 /// What every page begins with.
 const BEGINNING: &str = "<!DOCTYPE html>";

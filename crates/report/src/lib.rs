@@ -18,8 +18,8 @@ mod film;
 mod observer;
 mod page;
 
+pub use crate::page::{Suite, episode_page, run_page, suite_page};
 pub use above::episode_figure;
 pub use error::Error;
 pub use film::episode_film;
 pub use observer::{Observer, tool_parts};
-pub use page::{Suite, episode_page, may_be_replaced, run_page, suite_page};

@@ -1,77 +1,83 @@
 //! Before and after: held-out episodes, the worst one in plots, and what the residuals look like.
 
-use super::html::{escape, fixed, mean_square, significant, words};
-use super::svg::{Axis, Plot, strip, strip_labels};
+use maud::html;
+use page::number::{fixed, mean_square, percent, significant};
+use page::{Markup, Words, table, text};
+
+use super::plain;
+use super::svg::{Axis, Plot, strip, strip_labels, upright};
 use crate::evidence::{ChannelError, Course, Evidence, Path, REACH, Residuals};
 use crate::report::{Report, Verdict};
 use crate::terms::{Coefficient, FoundTerm, LackingForce};
 
-const KEY: &str = "<p class=\"key\"><i class=\"km\"></i>measured<i class=\"kb\"></i>before: re-tuned nominal<i class=\"ka\"></i>after: with the named effects</p>";
-const KEY_NONE: &str = "<p class=\"key\"><i class=\"km\"></i>measured<i class=\"kb\"></i>re-tuned nominal (before and after are the same)</p>";
-
-/// Everything about the gap.
-pub(super) fn before_after(report: &Report) -> String {
-    let same = report.effects.is_empty();
-    let key = if same { KEY_NONE } else { KEY };
-    let heldout = &report.heldout;
-    let mut out = if same {
-        format!(
-            "<p>Held-out mean square {}; noise alone leaves {}.</p>",
-            fixed(heldout.before, 2),
-            fixed(heldout.noise_floor, 0)
-        )
-    } else {
-        format!(
-            "<p>Held-out mean square {} before, {} after; noise alone leaves {}. {} % of the gap is closed.</p>",
-            fixed(heldout.before, 2),
-            fixed(heldout.after, 2),
-            fixed(heldout.noise_floor, 0),
-            fixed(100.0 * heldout.closed_fraction, 0)
-        )
-    };
-    out += key;
-    out += &dumbbells(report, same);
-    out += &errors(&report.evidence.errors, same);
-    out + &plots(&report.evidence, same)
+/// What the colours of the charts mean.
+fn key(same: bool, words: &Words) -> Markup {
+    let retuned = words.mark("re-tuned");
+    html! {
+        p.key {
+            i.km {} "measured" i.kb {}
+            @if same { (retuned) " nominal (before and after are the same)" } @else { "before: " (retuned) " nominal" i.ka {} "after: with the named effects" }
+        }
+    }
 }
 
-fn dumbbells(report: &Report, same: bool) -> String {
+/// Everything about the gap.
+pub(super) fn before_after(report: &Report, words: &Words) -> Markup {
+    let same = report.effects.is_empty();
+    let heldout = &report.heldout;
+    let [before, after] = [heldout.before, heldout.after].map(|value| fixed(value, 2));
+    html! {
+        p {
+            (words.mark_as("held out", "Held-out")) " " (words.mark("mean square")) " " (before)
+            @if !same { " before, " (after) " after" }
+            "; noise alone leaves " (fixed(heldout.noise_floor, 0)) "."
+            @if !same { " " (percent(heldout.closed_fraction)) " of the " (words.mark("gap")) " is closed." }
+        }
+        (key(same, words))
+        (dumbbells(report, same))
+        (errors(&report.evidence.errors, same))
+        (plots(&report.evidence, same))
+    }
+}
+
+fn dumbbells(report: &Report, same: bool) -> Markup {
     let mut episodes = report.heldout.episodes.clone();
     if episodes.is_empty() {
-        return "<p class=\"soft\">No episode was held out.</p>".into();
+        return html! { p.soft { "No episode was held out." } };
     }
     episodes.sort_by(|a, b| b.1.total_cmp(&a.1));
     let floor = report.heldout.noise_floor;
     let axis = Axis::logarithmic(
         episodes.iter().flat_map(|(_, before, after)| [*before, *after]).chain([0.5 * floor, 3.0 * floor]),
     );
-    let noise = axis.percent(floor);
-    let mut out = String::from("<h3>Each held-out episode</h3>");
-    for (id, before, after) in &episodes {
+    let number = |value: f64| if value.abs() < 9.995 { fixed(value, 2) } else { mean_square(value) };
+    let row = |(id, before, after): &(u64, f64, f64)| {
         let (b, a) = (axis.percent(*before), axis.percent(*after));
-        let mut inside = format!("<line class=\"mark\" x1=\"{noise}\" x2=\"{noise}\" y1=\"0\" y2=\"22\"/>");
-        if !same {
-            inside += &format!("<line class=\"link\" x1=\"{b}\" x2=\"{a}\" y1=\"11\" y2=\"11\"/>");
-        }
-        inside += &format!("<circle class=\"b\" cx=\"{b}\" cy=\"11\" r=\"5\"/>");
-        if !same {
-            inside += &format!("<circle class=\"a\" cx=\"{a}\" cy=\"11\" r=\"5\"/>");
-        }
-        let number = |value: f64| if value.abs() < 9.995 { fixed(value, 2) } else { mean_square(value) };
+        let inside = html! {
+            (upright("mark", &axis, floor, 22))
+            @if !same { line.link x1=(b) x2=(a) y1="11" y2="11" {} }
+            circle.b cx=(b) cy="11" r="5" {}
+            @if !same { circle.a cx=(a) cy="11" r="5" {} }
+        };
         let numbers = if same { number(*before) } else { format!("{} → {}", number(*before), number(*after)) };
-        out += &format!(
-            "<div class=\"row episode\"><span>episode {id}</span><div>{}</div><span>{numbers}</span></div>",
-            strip(&axis, 5, 22, &inside)
-        );
+        html! {
+            div class="row episode" {
+                span { "episode " (id) } div { (strip(&axis, 5, 22, &inside)) } span { (numbers) }
+            }
+        }
+    };
+    html! {
+        h3 { "Each held-out episode" }
+        @for episode in &episodes { (row(episode)) }
+        div class="row axis" { span {} div { (strip_labels(&axis, 5)) } span {} }
+        p.soft { "Mean square of the white residuals, logarithmic; dashed: noise." }
     }
-    out += &format!("<div class=\"row axis\"><span></span><div>{}</div><span></span></div>", strip_labels(&axis, 5));
-    out + "<p class=\"soft\">Mean square of the white residuals, logarithmic; dashed: noise.</p>"
 }
 
 /// Errors in units of a ruler: millimetres, milliradians, newtons.
-fn errors(errors: &[ChannelError], same: bool) -> String {
+fn errors(errors: &[ChannelError], same: bool) -> Markup {
     if errors.is_empty() {
-        return String::new();
+        return text("");
     }
     let row = |error: &ChannelError| {
         let (factor, unit) = match error.unit {
@@ -79,51 +85,50 @@ fn errors(errors: &[ChannelError], same: bool) -> String {
             "rad" => (1e3, "mrad"),
             unit => (1.0, unit),
         };
-        let cells = |sizes: [f64; 2]| -> String {
-            let shown = if same { &sizes[..1] } else { &sizes[..] };
-            shown.iter().map(|size| format!("<td>{}</td>", significant(factor * size, 3))).collect()
-        };
-        format!(
-            "<tr><td>{}</td><td>{unit}</td>{}{}</tr>",
-            words(error.channel.name()),
-            cells([error.before, error.after]),
-            cells([error.median_before, error.median_after])
-        )
+        let pairs = [[error.before, error.after], [error.median_before, error.median_after]];
+        let sizes = pairs.into_iter().flat_map(|sizes| sizes.into_iter().take(if same { 1 } else { 2 }));
+        let mut cells = vec![text(plain(error.channel.name())), text(unit)];
+        cells.extend(sizes.map(|size| text(significant(factor * size, 3))));
+        cells
     };
-    let heads = if same {
-        "<th>root mean square</th><th>median</th>"
+    let heads: &[&str] = if same {
+        &["channel", "unit", "root mean square", "median"]
     } else {
-        "<th>root mean square before</th><th>after</th><th>median before</th><th>after</th>"
+        &["channel", "unit", "root mean square before", "after", "median before", "after"]
     };
-    let rows: String = errors.iter().map(row).collect();
-    format!(
-        "<h3>Held-out error of each channel</h3><table><tr><th>channel</th><th>unit</th>{heads}</tr>{rows}</table>\
-         <p class=\"soft\">Measured − simulated, over components and blocks of rows, noise of the sensors included; an episode that has gone \
-         another way counts in the root mean square more than in the median.</p>"
-    )
+    let heads: Vec<Markup> = heads.iter().map(text).collect();
+    let rows: Vec<Vec<Markup>> = errors.iter().map(row).collect();
+    html! {
+        h3 { "Held-out error of each channel" }
+        (table(&heads, &rows))
+        p.soft {
+            "Measured − simulated, over components and blocks of rows, noise of the sensors included; an episode that has gone \
+             another way counts in the root mean square more than in the median."
+        }
+    }
 }
 
-fn plots(evidence: &Evidence, same: bool) -> String {
-    let mut out = String::new();
+fn plots(evidence: &Evidence, same: bool) -> Markup {
     let worst = evidence.episode.map(|id| format!("episode {id}, the worst held out")).unwrap_or_default();
+    let mut figures = Vec::new();
     if evidence.path.measured.len() > 1 {
-        out += &path(&evidence.path, &worst, same);
+        figures.push(path(&evidence.path, &worst, same));
     }
     if let Some(course) = evidence.course.as_ref().filter(|course| course.time_secs.len() > 1) {
-        out += &force(course, &worst, same);
+        figures.push(force(course, &worst, same));
     }
     if evidence.residuals.count > 0 {
-        out += &histogram(&evidence.residuals, same);
-        out += &whiteness(&evidence.residuals, same);
+        figures.push(histogram(&evidence.residuals, same));
+        figures.push(whiteness(&evidence.residuals, same));
     }
-    if out.is_empty() { out } else { format!("<h3>To the eye</h3><div class=\"plots\">{out}</div>") }
+    html! { @if !figures.is_empty() { h3 { "To the eye" } div.plots { @for figure in &figures { (figure) } } } }
 }
 
-fn figure(svg: &str, caption: &str) -> String {
-    format!("<figure>{svg}<figcaption>{caption}</figcaption></figure>")
+fn figure(svg: &Markup, caption: &str) -> Markup {
+    html! { figure { (svg) figcaption { (caption) } } }
 }
 
-fn path(path: &Path, worst: &str, same: bool) -> String {
+fn path(path: &Path, worst: &str, same: bool) -> Markup {
     let all = || path.measured.iter().chain(&path.before).chain(&path.after);
     let mut plot = Plot::square(Axis::linear(all().map(|p| p[0])), Axis::linear(all().map(|p| p[1])));
     plot.line("lm", path.measured.iter().copied());
@@ -139,7 +144,7 @@ fn path(path: &Path, worst: &str, same: bool) -> String {
     )
 }
 
-fn force(course: &Course, worst: &str, same: bool) -> String {
+fn force(course: &Course, worst: &str, same: bool) -> Markup {
     let values = course.measured.iter().chain(&course.before).chain(&course.after).copied();
     let mut plot = Plot::new(Axis::linear(course.time_secs.iter().copied()), Axis::linear(values));
     let line = |values: &[f64]| {
@@ -154,8 +159,8 @@ fn force(course: &Course, worst: &str, same: bool) -> String {
         ["x", "y", "z"].get(course.component).map_or_else(|| course.component.to_string(), |axis| (*axis).into());
     let (name, unit) = (course.channel.name(), course.channel.unit());
     let component = if name == "joint_torque" { format!("joint {}", course.component) } else { axis };
-    let title = format!("{} {component}, {unit}", words(name));
-    let caption = format!("{}, {component}: {worst}.", words(name));
+    let title = format!("{} {component}, {unit}", plain(name));
+    let caption = format!("{}, {component}: {worst}.", plain(name));
     figure(&plot.finish("A channel over time", "time, s", &title), &caption)
 }
 
@@ -166,7 +171,7 @@ fn outline(shares: &[f64]) -> Vec<[f64; 2]> {
     shares.iter().enumerate().flat_map(|(i, share)| [[edge(i), share / width], [edge(i + 1), share / width]]).collect()
 }
 
-fn histogram(residuals: &Residuals, same: bool) -> String {
+fn histogram(residuals: &Residuals, same: bool) -> Markup {
     let [before, after] = residuals.histogram.each_ref().map(|shares| outline(shares));
     let normal = |x: f64| (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let heights = before.iter().chain(&after).map(|p| p[1]).chain([0.0, normal(0.0)]);
@@ -183,7 +188,7 @@ fn histogram(residuals: &Residuals, same: bool) -> String {
     figure(&plot.finish("Distribution of the residuals", "residual, standard deviations", "density"), &caption)
 }
 
-fn whiteness(residuals: &Residuals, same: bool) -> String {
+fn whiteness(residuals: &Residuals, same: bool) -> Markup {
     let [before, after] = &residuals.autocorrelation;
     let band = residuals.white_below;
     let lags = before.len().max(after.len()) as f64;
@@ -204,45 +209,38 @@ fn whiteness(residuals: &Residuals, same: bool) -> String {
 }
 
 /// What remains, as a sentence or two.
-pub(super) fn remains(report: &Report) -> String {
-    let description = report.description.as_deref().map(escape).unwrap_or_default();
+pub(super) fn remains(report: &Report) -> Markup {
     match report.verdict {
-        Verdict::Unknown => {
-            let lacking = report.lacking_force.as_ref().map(lacking_force).unwrap_or_default();
-            format!("<div class=\"call\"><p><b>Unexplained.</b> {description}</p></div>{lacking}")
-        }
-        Verdict::Effect => {
-            "<p>Where the model with the named effects still disagrees, on the episodes that it was fitted to:</p>"
-                .into()
-        }
-        Verdict::None => "<p>Nothing that shows: the map above is what the re-tuned nominal model leaves.</p>".into(),
+        Verdict::Unknown => html! {
+            div.call { p { b { "Unexplained." } " " (report.description.as_deref().unwrap_or_default()) } }
+            @if let Some(lacking) = &report.lacking_force { (lacking_force(lacking)) }
+        },
+        Verdict::Effect => html! {
+            p { "Where the model with the named effects still disagrees, on the episodes that it was fitted to:" }
+        },
+        Verdict::None => html! { p { "Nothing that shows: the map above is what the re-tuned nominal model leaves." } },
     }
 }
 
 /// What the force that is lacking follows.
-fn lacking_force(lacking: &LackingForce) -> String {
-    let value = |c: &Coefficient| format!("{} {} {}", words(c.key), significant(c.value, 3), c.unit);
+fn lacking_force(lacking: &LackingForce) -> Markup {
+    let value = |c: &Coefficient| format!("{} {} {}", plain(c.key), significant(c.value, 3), c.unit);
     let row = |term: &FoundTerm| {
         let values: Vec<String> = term.coefficients.iter().map(value).collect();
-        format!(
-            "<tr><td>{}</td><td>{} %</td><td>{}</td></tr>",
-            escape(&term.description),
-            fixed(100.0 * term.share, 0),
-            values.join(", ")
-        )
+        vec![text(&term.description), text(percent(term.share)), text(values.join(", "))]
     };
-    let table = if lacking.terms.is_empty() {
-        "<p>It follows no term that was tried: constant, direction and speed of the motion, place, time, known weight, force.</p>".into()
-    } else {
-        let rows: String = lacking.terms.iter().map(row).collect();
-        format!("<table><tr><th>term</th><th>explains</th><th>values</th></tr>{rows}</table>")
-    };
-    format!(
-        "<h3>The force that is lacking</h3>{table}<p class=\"soft\">{} N on the object beyond the re-tuned nominal model (root mean square of {} windows in which it moves, of {} episodes; \
-         the sensors' noise makes {} N). Explains: share of its square in episodes that were left out. Base axes.</p>",
-        significant(lacking.root_mean_square_n, 2),
-        lacking.windows,
-        lacking.episodes,
-        significant(lacking.noise_n, 2)
-    )
+    let rows: Vec<Vec<Markup>> = lacking.terms.iter().map(row).collect();
+    html! {
+        h3 { "The force that is lacking" }
+        @if rows.is_empty() {
+            p { "It follows no term that was tried: constant, direction and speed of the motion, place, time, known weight, force." }
+        } @else {
+            div.values { (table(&["term", "explains", "values"].map(text), &rows)) }
+        }
+        p.soft {
+            (significant(lacking.root_mean_square_n, 2)) " N on the object beyond the re-tuned nominal model (root mean square of "
+            (lacking.windows) " windows in which it moves, of " (lacking.episodes) " episodes; the sensors' noise makes "
+            (significant(lacking.noise_n, 2)) " N). Explains: share of its square in episodes that were left out. Base axes."
+        }
+    }
 }

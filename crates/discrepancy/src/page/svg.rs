@@ -1,6 +1,11 @@
-//! Small charts: axes in shares of the width, so that a chart is as wide as its place while its text keeps its size.
+//! Small charts in the colours of the page, dark or light, printed or on a telephone: strips are as wide as their place while their text keeps its size.
+//!
+//! The crate `figures` draws files: its pictures have colours and sizes of their own, a white ground and a legend. Here one key serves several charts, a bar
+//! stands in a row of text, and the style sheet says what a line looks like.
 
-use super::html::{fixed, significant};
+use maud::html;
+use page::Markup;
+use page::number::{fixed, significant};
 
 /// From values to shares of a width.
 #[derive(Clone, Copy, Debug)]
@@ -78,24 +83,29 @@ fn span(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     if low <= high { (low, high) } else { (0.0, 1.0) }
 }
 
+/// An upright line across a strip of this height.
+pub(super) fn upright(class: &str, axis: &Axis, value: f64, height: u32) -> Markup {
+    let x = axis.percent(value);
+    html! { line class=(class) x1=(x) x2=(x) y1="0" y2=(height) {} }
+}
+
 /// A strip as wide as its place, with the axis' grid behind `inside`.
-pub(super) fn strip(axis: &Axis, ticks: usize, height: u32, inside: &str) -> String {
-    let mut out = format!("<svg width=\"100%\" height=\"{height}\" aria-hidden=\"true\">");
-    for tick in axis.ticks(ticks) {
-        let x = axis.percent(tick);
-        out += &format!("<line class=\"grid\" x1=\"{x}\" x2=\"{x}\" y1=\"0\" y2=\"{height}\"/>");
+pub(super) fn strip(axis: &Axis, ticks: usize, height: u32, inside: &Markup) -> Markup {
+    html! {
+        svg width="100%" height=(height) aria-hidden="true" {
+            @for tick in axis.ticks(ticks) { (upright("grid", axis, tick, height)) }
+            (inside)
+        }
     }
-    out + inside + "</svg>"
 }
 
 /// The labels under strips.
-pub(super) fn strip_labels(axis: &Axis, ticks: usize) -> String {
-    let mut out = String::from("<svg width=\"100%\" height=\"16\" aria-hidden=\"true\">");
-    for tick in axis.ticks(ticks) {
-        let (x, label) = (axis.percent(tick), axis.label(tick));
-        out += &format!("<text x=\"{x}\" y=\"12\" text-anchor=\"middle\">{label}</text>");
+pub(super) fn strip_labels(axis: &Axis, ticks: usize) -> Markup {
+    html! {
+        svg width="100%" height="16" aria-hidden="true" {
+            @for tick in axis.ticks(ticks) { text x=(axis.percent(tick)) y="12" text-anchor="middle" { (axis.label(tick)) } }
+        }
     }
-    out + "</svg>"
 }
 
 /// A plot of fixed proportions with two axes.
@@ -105,7 +115,7 @@ pub(super) struct Plot {
     pub(super) x: Axis,
     /// Vertical.
     pub(super) y: Axis,
-    body: String,
+    body: Vec<Markup>,
 }
 
 /// Size of a plot, and its inner borders: left, right, top, bottom.
@@ -115,7 +125,7 @@ const BORDERS: [f64; 4] = [64.0, 388.0, 10.0, 240.0];
 impl Plot {
     /// Empty.
     pub(super) fn new(x: Axis, y: Axis) -> Self {
-        Self { x, y, body: String::new() }
+        Self { x, y, body: Vec::new() }
     }
 
     /// The same, with one scale for both axes.
@@ -141,50 +151,52 @@ impl Plot {
             .map(|[x, y]| format!("{x:.1},{y:.1}"))
             .collect();
         if !points.is_empty() {
-            self.body += &format!("<polyline class=\"{class}\" points=\"{}\"/>", points.join(" "));
+            self.body.push(html! { polyline class=(class) points=(points.join(" ")) {} });
         }
     }
 
     /// A dot.
     pub(super) fn dot(&mut self, class: &str, [x, y]: [f64; 2]) {
         let [x, y] = self.place(x, y);
-        self.body += &format!("<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\"/>");
+        self.body.push(html! { circle class=(class) cx=(tenths(x)) cy=(tenths(y)) r="4" {} });
     }
 
     /// A bar from `base` to `y`, from `x[0]` to `x[1]`.
     pub(super) fn bar(&mut self, class: &str, x: [f64; 2], base: f64, y: f64) {
         let ([left, a], [right, b]) = (self.place(x[0], base), self.place(x[1], y));
         let (top, height, width) = (a.min(b), (a - b).abs(), (right - left).max(0.5));
-        self.body += &format!(
-            "<rect class=\"{class}\" x=\"{left:.1}\" y=\"{top:.1}\" width=\"{width:.1}\" height=\"{height:.1}\"/>"
-        );
+        self.body.push(html! {
+            rect class=(class) x=(tenths(left)) y=(tenths(top)) width=(tenths(width)) height=(tenths(height)) {}
+        });
     }
 
-    /// With axes and their titles, which are ours and need no escape.
-    pub(super) fn finish(&self, title: &str, x_title: &str, y_title: &str) -> String {
+    /// With axes and their titles.
+    pub(super) fn finish(&self, title: &str, x_title: &str, y_title: &str) -> Markup {
         let ([width, height], [left, right, top, bottom]) = (SIZE, BORDERS);
-        let mut out = format!("<svg viewBox=\"0 0 {width} {height}\" role=\"img\"><title>{title}</title>");
-        for tick in self.x.ticks(6) {
-            let ([x, _], label) = (self.place(tick, 0.0), self.x.label(tick));
-            out += &format!("<line class=\"grid\" x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{top}\" y2=\"{bottom}\"/>");
-            out += &format!("<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\">{label}</text>", bottom + 15.0);
-        }
-        for tick in self.y.ticks(5) {
-            let ([_, y], label) = (self.place(0.0, tick), self.y.label(tick));
-            out += &format!("<line class=\"grid\" x1=\"{left}\" x2=\"{right}\" y1=\"{y:.1}\" y2=\"{y:.1}\"/>");
-            out += &format!("<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{label}</text>", left - 5.0, y + 4.0);
-        }
         let (middle, centre) = (0.5 * (left + right), 0.5 * (top + bottom));
-        out += &format!(
-            "<rect class=\"frame\" x=\"{left}\" y=\"{top}\" width=\"{}\" height=\"{}\"/>",
-            right - left,
-            bottom - top
-        );
-        out += &self.body;
-        out += &format!("<text x=\"{middle}\" y=\"{}\" text-anchor=\"middle\">{x_title}</text>", height - 8.0);
-        out += &format!(
-            "<text x=\"11\" y=\"{centre}\" text-anchor=\"middle\" transform=\"rotate(-90 11 {centre})\">{y_title}</text>"
-        );
-        out + "</svg>"
+        html! {
+            svg viewBox={ "0 0 " (width) " " (height) } role="img" {
+                title { (title) }
+                @for tick in self.x.ticks(6) {
+                    @let x = tenths(self.place(tick, 0.0)[0]);
+                    line.grid x1=(x) x2=(x) y1=(top) y2=(bottom) {}
+                    text x=(x) y=(bottom + 15.0) text-anchor="middle" { (self.x.label(tick)) }
+                }
+                @for tick in self.y.ticks(5) {
+                    @let y = self.place(0.0, tick)[1];
+                    line.grid x1=(left) x2=(right) y1=(tenths(y)) y2=(tenths(y)) {}
+                    text x=(left - 5.0) y=(tenths(y + 4.0)) text-anchor="end" { (self.y.label(tick)) }
+                }
+                rect.frame x=(left) y=(top) width=(right - left) height=(bottom - top) {}
+                @for shape in &self.body { (shape) }
+                text x=(middle) y=(height - 8.0) text-anchor="middle" { (x_title) }
+                text x="11" y=(centre) text-anchor="middle" transform=(format!("rotate(-90 11 {centre})")) { (y_title) }
+            }
+        }
     }
+}
+
+/// A coordinate.
+fn tenths(value: f64) -> String {
+    format!("{value:.1}")
 }

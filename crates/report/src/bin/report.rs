@@ -6,7 +6,8 @@ use std::process::ExitCode;
 use anyhow::{Result, anyhow};
 use clap::Parser;
 use experiments::Archive;
-use report::{Error, Suite, episode_figure, episode_page, may_be_replaced, run_page, suite_page};
+use page::may_be_replaced;
+use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
 
 /// Makes a self-contained HTML page of a run of `eval`, of all tables of `eval --all`, or of an episode of `demo`.
 #[derive(Debug, Parser)]

@@ -4,7 +4,12 @@ use std::path::Path;
 
 use experiments::{Combined, CombinedRow};
 
-use super::{escape, fixed, p_value, page, percent, picture, section, table};
+use maud::html;
+use page::number::{p_value, percent};
+use page::{Markup, Words, picture, section, table, text};
+
+use super::run::failure;
+use super::titled;
 use crate::Error;
 
 /// Combined tables with their pictures.
@@ -79,107 +84,118 @@ fn is_some_table(text: &str) -> bool {
 /// A page about all tables.
 #[must_use]
 pub fn suite_page(suite: &Suite) -> String {
-    let mut body = String::new();
-    for (name, combined, pictures) in &suite.tables {
-        let mut inside = grid(combined);
-        if !combined.missing.is_empty() {
-            inside += &format!("<p class=\"bad\">Not finished: {}.</p>\n", escape(&combined.missing.join(", ")));
-        }
-        for (name, svg) in pictures {
-            inside += &picture(svg, name);
-        }
-        inside += &comparisons(combined);
-        inside += &failures(combined);
-        inside += &source(combined);
-        body += &section(name, &combined.title, &inside);
-    }
-    page("Results", &body)
+    let words = Words::default();
+    let tables = suite.tables.iter();
+    let sections: Vec<Markup> = tables
+        .map(|(name, combined, pictures)| {
+            let inside = html! {
+                (grid(combined, &words))
+                @if !combined.missing.is_empty() {
+                    p.bad { "Not finished: " (combined.missing.join(", ")) "." }
+                }
+                @for (name, svg) in pictures { (picture(svg, name)) }
+                (comparisons(combined, &words))
+                (failures(combined, &words))
+                (source(combined, &words))
+            };
+            section(name, &combined.title, &inside)
+        })
+        .collect();
+    titled("Results", &html! { @for section in &sections { (section) } (section("words", "Words", &words.list())) })
 }
 
 /// Methods by domains.
-fn grid(combined: &Combined) -> String {
+fn grid(combined: &Combined, words: &Words) -> Markup {
     let domains = combined.domains();
     let cell = |row: Option<&CombinedRow>| {
-        row.map_or("–".into(), |r| {
-            let published = r.row.published.map_or(String::new(), |p| format!(" ({})", p.successes));
-            let [low, high] = r.row.interval95;
-            format!(
-                "<span title=\"95 %: {} to {}\">{} of {}{published}</span>",
-                percent(low),
-                percent(high),
-                r.row.successes,
-                r.row.trials
-            )
-        })
+        let Some(row) = row.map(|combined| &combined.row) else { return text("–") };
+        let [low, high] = row.interval95;
+        let published = row.published.map_or(String::new(), |p| format!(" ({})", p.successes));
+        html! {
+            span title=(format!("95 %: {} to {}", percent(low), percent(high))) {
+                (row.successes) " of " (row.trials) (published)
+            }
+        }
     };
-    let rows: Vec<Vec<String>> = combined
+    let rows: Vec<Vec<Markup>> = combined
         .arms()
         .iter()
         .map(|arm| {
-            let mut cells = vec![escape(&arm.label())];
+            let mut cells = vec![text(arm.label())];
             cells.extend(domains.iter().map(|domain| cell(combined.row(arm, domain))));
             cells
         })
         .collect();
-    let mut heads = vec!["reached the goal"];
-    heads.extend(domains.iter().map(String::as_str));
-    table(&heads, &rows)
-        + "<p class=\"soft\">In brackets the paper's. Point at a cell for its 95 % Wilson interval.</p>\n"
+    let mut heads = vec![words.mark_as("goal", "reached the goal")];
+    heads.extend(domains.iter().map(|domain| words.mark_known(domain)));
+    let methods: std::collections::BTreeSet<_> = combined.rows.iter().map(|row| row.row.method).collect();
+    html! {
+        (table(&heads, &rows))
+        p.soft {
+            "In brackets the paper's. Point at a cell for its 95 % Wilson interval. Methods: "
+            @for (i, method) in methods.iter().enumerate() { @if i > 0 { ", " } (words.mark(method.name())) }
+            "."
+        }
+    }
 }
 
-fn comparisons(combined: &Combined) -> String {
+fn comparisons(combined: &Combined, words: &Words) -> Markup {
     // Over several domains together: those of one domain are in the files.
     let domains = combined.domains();
     let several = combined.comparisons.iter().filter(|c| domains.len() == 1 || !domains.contains(&c.domains));
-    let rows: Vec<Vec<String>> = several
+    let rows: Vec<Vec<Markup>> = several
         .map(|c| {
             let (first, second) = c.arms();
             vec![
-                format!("{}: {} and {}", escape(&c.domains), escape(&first.label()), escape(&second.label())),
-                c.first_only.to_string(),
-                c.second_only.to_string(),
-                p_value(c.p),
-                p_value(c.mcnemar_p),
+                text(format!("{}: {} and {}", c.domains, first.label(), second.label())),
+                text(c.first_only),
+                text(c.second_only),
+                text(p_value(c.p)),
+                text(p_value(c.mcnemar_p)),
             ]
         })
         .collect();
     if rows.is_empty() {
-        return String::new();
+        return text("");
     }
-    let heads =
-        ["on the same worlds", "the first alone", "the second alone", "p (each world number one sign)", "McNemar p"];
-    format!("<details><summary>Comparisons on the same worlds</summary>{}</details>\n", table(&heads, &rows))
+    let heads = ["on the same worlds", "the first alone", "the second alone", "p (each world number one sign)"];
+    let heads: Vec<Markup> = heads.iter().map(text).chain([words.mark("McNemar p")]).collect();
+    html! { details { summary { "Comparisons on the same worlds" } (table(&heads, &rows)) } }
 }
 
-fn failures(combined: &Combined) -> String {
+fn failures(combined: &Combined, words: &Words) -> Markup {
     let mut kinds: Vec<_> = combined.rows.iter().flat_map(|row| row.row.failures.keys().copied()).collect();
     kinds.sort();
     kinds.dedup();
-    let mut heads = vec!["failed by"];
-    heads.extend(kinds.iter().map(|kind| kind.name()));
-    let rows: Vec<Vec<String>> = combined
+    let mut heads = vec![text("failed by")];
+    heads.extend(kinds.iter().map(|kind| failure(kind.name(), words)));
+    let rows: Vec<Vec<Markup>> = combined
         .rows
         .iter()
         .map(|row| {
-            let mut cells = vec![escape(&format!("{}, {}", row.arm().label(), row.row.domain))];
-            cells.extend(kinds.iter().map(|kind| row.row.failures.get(kind).unwrap_or(&0).to_string()));
+            let mut cells = vec![text(format!("{}, {}", row.arm().label(), row.row.domain))];
+            cells.extend(kinds.iter().map(|kind| text(row.row.failures.get(kind).unwrap_or(&0))));
             cells
         })
         .collect();
-    format!("<details><summary>Why trials failed</summary>{}</details>\n", table(&heads, &rows))
+    html! { details { summary { "Why trials failed" } (table(&heads, &rows)) } }
 }
 
-fn source(combined: &Combined) -> String {
+fn source(combined: &Combined, words: &Words) -> Markup {
     let provenance = &combined.provenance;
-    let rows: Vec<Vec<String>> = provenance
+    let rows: Vec<Vec<Markup>> = provenance
         .runs
         .iter()
         .map(|(folder, run)| {
             let hash = run.scenario_hash.get(..12).unwrap_or(&run.scenario_hash);
-            vec![escape(folder), escape(&run.commit), escape(hash), run.trials.to_string()]
+            vec![text(folder), text(&run.commit), text(hash), text(run.trials)]
         })
         .collect();
-    let heads = ["run", "commit", "scenario", "trials"];
-    let seed = fixed(provenance.common.seed as f64, 0);
-    format!("<details><summary>Where this comes from (seed {seed})</summary>{}</details>\n", table(&heads, &rows))
+    let heads = [text("run"), text("commit"), words.mark("scenario"), words.mark_as("trial", "trials")];
+    html! {
+        details {
+            summary { "Where this comes from (seed " (provenance.common.seed) ")" }
+            (table(&heads, &rows))
+        }
+    }
 }

@@ -6,7 +6,7 @@ use super::*;
 
 /// Every element that is opened is closed in order.
 fn check_structure(html: &str) {
-    const VOID: [&str; 2] = ["meta", "!DOCTYPE"];
+    const VOID: [&str; 3] = ["meta", "!DOCTYPE", "br"];
     let mut open: Vec<&str> = Vec::new();
     let mut rest = html;
     while let Some(start) = rest.find('<') {
@@ -21,6 +21,7 @@ fn check_structure(html: &str) {
         }
     }
     assert!(open.is_empty(), "{open:?}");
+    assert!(!html.contains("class=\"undefined\""), "a word that the glossary lacks");
     for foreign in ["http://", "https://", "<script", "url(", "@import"] {
         let found = html.replace("http://www.w3.org/2000/svg", "");
         assert!(!found.contains(foreign), "{foreign}");
@@ -46,7 +47,7 @@ fn a_run_and_an_episode_have_their_parts() {
     let run = experiments::Archive::read(&root.join("assets/results/table1-surmise-D4")).unwrap();
     let html = run_page(&run).unwrap();
     check_structure(&html);
-    for id in ["success", "pictures", "failures", "pairs", "trials", "source"] {
+    for id in ["success", "pictures", "failures", "pairs", "trials", "source", "words"] {
         assert!(html.contains(&format!("<section id=\"{id}\">")), "{id}");
     }
     assert_eq!(html.matches("<figure").count(), run.figures().len());
@@ -70,19 +71,4 @@ fn a_table_of_another_version_is_named() {
     std::fs::write(folder.path().join("old.json"), "{\"rows\": [], \"comparisons\": [], \"provenance\": {}}").unwrap();
     let error = Suite::read(folder.path()).unwrap_err().to_string();
     assert!(error.contains("old.json") && error.contains("missing field"), "{error}");
-}
-
-#[test]
-fn pages_alone_may_be_replaced() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, text).unwrap();
-        path
-    };
-    assert!(may_be_replaced(&folder.path().join("none.html")));
-    assert!(may_be_replaced(&file("page.html", &episode_page(&EpisodeTrace::default(), ""))));
-    assert!(!may_be_replaced(&file("trials.jsonl", "{}\n")));
-    assert!(!may_be_replaced(&file("short", "<!DOC")));
-    assert!(!may_be_replaced(folder.path()));
 }
