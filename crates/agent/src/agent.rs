@@ -1,11 +1,11 @@
 //! The loop.
 
 use belief::Particles;
-use physics_model::effect::unknown::{log_density as log_density_of_effects, sample as sample_effects};
-use physics_model::{Action, GoalPolicy, HeuristicPolicy, Observation, Particle, PushModel};
 use planner::{Pomcp, SearchReport};
 use pomdp::{Discretise as _, Outcome, Policy, Prior as _, Proposals, Purpose, Rng, Seed, discounted_return};
 use prior::Suggester;
+use push_task::sampling::effects::{log_density as log_density_of_effects, sample as sample_effects};
+use push_task::{Action, GoalPolicy, HeuristicPolicy, Observation, Particle, PushModel};
 use scenario::{Filter, Problem, Rollouts, Tracker, with_known_joints};
 
 use crate::births::with_births;

@@ -1,7 +1,7 @@
 //! How far beliefs are from the truth, where a world knows it.
 
 use belief::Particles;
-use physics_model::Particle;
+use push_task::Particle;
 use serde::{Deserialize, Serialize};
 
 /// Errors of the beliefs of an episode: of the first one, then of that after each update. The estimate of a number is its weighted mean.
@@ -77,7 +77,8 @@ fn rounded(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, State, Theta};
+    use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
+    use push_task::State;
 
     use super::*;
 

@@ -1,9 +1,10 @@
 //! Hypotheses of the network that a belief has no ancestors for.
 
 use belief::Particles;
-use physics_model::{BodyState, Particle, PushModel};
+use physics_model::BodyState;
 use pomdp::{Belief as _, Rng};
 use prior::Suggester;
+use push_task::{Particle, PushModel};
 
 /// Draws from the network's latest suggestion, each with the measured part of a state of the belief, take `share` of its probability:
 /// b ← (1 − ε) b + ε q.

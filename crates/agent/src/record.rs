@@ -1,7 +1,7 @@
 //! What is kept of an episode.
 
-use physics_model::{Action, Observation};
 use pomdp::UpdateReport;
+use push_task::{Action, Observation};
 use serde::{Deserialize, Serialize};
 
 use crate::{BeliefErrors, WorldStep};

@@ -1,8 +1,8 @@
 //! Looking on at an episode.
 
 use belief::Particles;
-use physics_model::{Action, Particle};
 use planner::SearchReport;
+use push_task::{Action, Particle};
 
 use crate::StepRecord;
 

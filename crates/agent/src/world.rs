@@ -1,7 +1,7 @@
 //! What the loop acts on.
 
-use physics_model::{Action, ActionReport, Observation, Particle, PushModel};
 use pomdp::{Outcome, Rng};
+use push_task::{Action, ActionReport, Observation, Particle, PushModel};
 
 use crate::Error;
 

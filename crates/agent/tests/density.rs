@@ -5,10 +5,10 @@ use std::path::Path;
 use nalgebra::DMatrix;
 use physics_model::config::ObstacleMobility;
 use physics_model::state::BODY_LEN;
-use physics_model::{Particle, PushModel};
 use pomdp::{Purpose, Rng, Seed, StaticParameters as _};
 use prior::features::{self, ActionInput};
 use prior::{Mixture, density};
+use push_task::{Particle, PushModel};
 use rand::RngExt as _;
 use scenario::{Problem, Selection, find_root};
 

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use agent::{Agent, Error, Method, Reason, SimulatedWorld, World, WorldStep};
-use physics_model::{Action, Observation, Particle};
 use pomdp::{Outcome, Purpose, Seed};
+use push_task::{Action, Observation, Particle};
 use scenario::{Problem, Selection, find_root};
 
 fn problem(domain: &str, set: &[&str]) -> Problem {

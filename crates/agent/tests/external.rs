@@ -7,8 +7,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use agent::{Agent, Episode, Error, ExternalWorld, Method, Reason, Timeouts, World as _, WorldAddress, WorldError};
-use physics_model::Action;
 use pomdp::Seed;
+use push_task::Action;
 use scenario::{Problem, Selection, find_root};
 
 const GENEROUS: Duration = Duration::from_secs(120);

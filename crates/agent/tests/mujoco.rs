@@ -8,8 +8,8 @@ use std::process::Command;
 use std::time::Duration;
 
 use agent::{ExternalWorld, SimulatedWorld, Timeouts, World, WorldAddress, WorldStep};
-use physics_model::Action;
 use pomdp::{Purpose, Seed};
+use push_task::Action;
 use scenario::{Problem, Selection, find_root};
 
 const JOINTS: usize = 6;

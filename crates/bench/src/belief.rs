@@ -4,8 +4,8 @@ use std::path::Path;
 
 use anyhow::Result;
 use belief::Particles;
-use physics_model::{Action, HeuristicPolicy, Observation, Particle};
 use pomdp::{Outcome, Policy as _, Proposals, Purpose, Seed};
+use push_task::{Action, HeuristicPolicy, Observation, Particle};
 use scenario::{Problem, Selection, with_known_joints};
 use serde_json::{Map, Value, json};
 

@@ -10,13 +10,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::{Result, anyhow};
-use physics_model::action::minimum_jerk;
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::effect::Effect;
+use physics_model::motion::minimum_jerk;
 use physics_model::robot::ToolShape;
 use physics_model::world::{ToolPose, World, Wrench};
-use physics_model::{Action, BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushModel, State, Theta};
+use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
 use pomdp::{Purpose, Seed};
+use push_task::{Action, Particle, PushModel, State};
 use scenario::{Problem, Scenario, Selection};
 use serde::Serialize;
 use serde_json::{Map, Value, json};

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use physics_model::action::minimum_jerk;
 use physics_model::config::{ObstacleMobility, WorldConfig};
+use physics_model::motion::minimum_jerk;
 use physics_model::robot::ToolShape;
 use physics_model::world::{ToolPose, World, Wrench};
 use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use dataset::{Counts, Row};
 use physics_model::config::ObstacleMobility;
-use physics_model::{Action, ActionReport, GoalPolicy, HeuristicPolicy, Observation, Particle};
 use pomdp::{Outcome, Policy as _, Purpose, Seed};
+use push_task::{Action, ActionReport, GoalPolicy, HeuristicPolicy, Observation, Particle};
 use rand::RngExt as _;
 use scenario::{Problem, Scenario};
 

@@ -1,9 +1,9 @@
 //! What a dataset holds and how it is cut into shards.
 
 use dataset::{Plan, Schema};
-use physics_model::sensor::observation_names;
-use physics_model::state::State;
 use physics_model::theta::{CLASS_TARGETS, THETA_NAMES};
+use push_task::sensor::observation_names;
+use push_task::state::State;
 use scenario::Scenario;
 
 /// Columns of a dataset of this scenario's robot.
@@ -13,7 +13,7 @@ pub fn schema(scenario: &Scenario) -> Schema {
     Schema {
         robot: scenario.robot.name.clone(),
         observation: observation_names(scenario.sensor.force, joints),
-        action_count: physics_model::action::ACTION_COUNT,
+        action_count: push_task::action::ACTION_COUNT,
         state: State::names(joints),
         theta: THETA_NAMES.map(String::from).to_vec(),
         classes: CLASS_TARGETS.map(|(name, _)| name.to_string()).to_vec(),

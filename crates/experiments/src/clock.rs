@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use agent::{Error, World, WorldStep};
-use physics_model::{Action, Observation, Particle};
+use push_task::{Action, Observation, Particle};
 
 /// A clock that was started.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ mod tests {
         fn act(&mut self, _: Action) -> Result<WorldStep, Error> {
             std::thread::sleep(Duration::from_millis(50));
             let (observation, joints_rad) = self.reset()?;
-            let report = physics_model::ActionReport::default();
+            let report = push_task::ActionReport::default();
             Ok(WorldStep { observation, joints_rad, reward: 0.0, outcome: Outcome::Continue, report })
         }
 

@@ -16,8 +16,7 @@ use rapier3d::prelude::{
 };
 
 use crate::config::ServoConfig;
-use crate::effect::Hooks;
-use crate::loads::Effects;
+use crate::effect::{Effects, Hooks};
 use crate::robot::{ArmBody, JointVector, Robot};
 use crate::world::pose;
 

@@ -34,7 +34,7 @@ pub use catalogue::{EffectConfig, EffectKind};
 pub use memory::Memory;
 pub use parameter::{Neutral, Parameter, Parametric, Scale};
 pub use signal::{CommandFilter, CommandSpace, CommandStart, ForceFilter, ToolMoment};
-pub use unknown::{EffectDistributions, EffectParameter, EffectValue};
+pub use unknown::{EffectParameter, EffectValue};
 
 /// Which free body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,6 +224,23 @@ impl Hooks {
     #[must_use]
     pub fn of(effects: &[Box<dyn Effect>]) -> Self {
         effects.iter().fold(Self::NONE, |all, effect| all.and(effect.hooks()))
+    }
+}
+
+/// A list of effects, and what they change together.
+#[derive(Clone, Copy, Debug)]
+pub struct Effects<'a> {
+    /// The effects, in the order in which they apply.
+    pub list: &'a [Box<dyn Effect>],
+    /// All hooks of the list.
+    pub hooks: Hooks,
+}
+
+impl<'a> Effects<'a> {
+    /// Of a list.
+    #[must_use]
+    pub fn new(list: &'a [Box<dyn Effect>]) -> Self {
+        Self { list, hooks: Hooks::of(list) }
     }
 }
 

@@ -1,8 +1,8 @@
-//! Rapier worlds built from (s, Θ), and robot models read from URDF: the simulator behind planning, belief and data.
+//! Rapier worlds built from (s, Θ), robot models read from URDF, effects beyond rigid bodies with Coulomb friction, and rigs of measured logs.
 //!
-//! [`PushModel`] is the pushing task as a [`pomdp::GenerativeModel`]: every action restores a fresh rapier world from the
-//! particle's (s, Θ), moves the tool along a minimum-jerk path and reads the sensors. A transition is therefore a pure function
-//! of (s, Θ, action, random stream): bit for bit the same whatever ran before, on any thread.
+//! [`world::World`] is restored from the states of its bodies and Θ, and stepped. [`rig::Rig`] runs the commands of a log through such a world.
+//! [`effect`] holds what either may have beyond rigid bodies. [`robot::Robot`] is an arm from a URDF file. This crate knows no task, no reward and
+//! no belief: those of the pushing task are in the crate `push-task`.
 //!
 //! # Accuracy
 //!
@@ -66,47 +66,27 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod action;
 mod arm;
 mod bodies;
 pub mod config;
 mod contact;
-mod drive;
 pub mod effect;
 pub mod effects;
 pub mod error;
 pub mod feasible;
-mod force;
 mod friction;
-pub mod goal;
-pub mod heuristic;
 mod loads;
-pub mod model;
-mod model_error;
-mod motion;
-pub mod parameters;
-mod perturb;
+pub mod motion;
 mod prism;
-pub mod reward;
 pub mod rig;
 pub mod robot;
-pub mod sampling;
-pub mod sensor;
-mod simulation;
 mod spring;
 pub mod state;
 pub mod theta;
 pub mod world;
 
-pub use action::Action;
-pub use config::PushConfig;
 pub use effect::{EffectConfig, EffectKind};
 pub use error::{EffectError, Impossible};
-pub use goal::GoalPolicy;
-pub use heuristic::HeuristicPolicy;
-pub use model::{ActionReport, Particle, PushModel};
 pub use rig::{Prism, Rig, RigError, RigObject, RigReading, RigShape, RigStart, RigTool};
-pub use sampling::WorldDistribution;
-pub use sensor::{Observation, ObservationKey};
-pub use state::{BodyState, State};
+pub use state::BodyState;
 pub use theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta};

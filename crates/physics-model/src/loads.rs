@@ -9,7 +9,7 @@ use rapier3d::prelude::{
 
 use crate::bodies::Body;
 use crate::config::WorldConfig;
-use crate::effect::{BodyView, Effect, Hooks, Load, Surroundings, TableContact};
+use crate::effect::{BodyView, Effects, Hooks, Load, Surroundings, TableContact};
 use crate::friction::OpposeSlip;
 use crate::theta::ObjectShape;
 use crate::world::{Wrench, array, vector};
@@ -19,18 +19,7 @@ const ON_TABLE_M: f64 = 0.002;
 /// Distance, m, up to which the engine is asked for the gap between tool and object.
 const GAP_LIMIT_M: f32 = 0.002;
 
-/// The effects of a world and what they change.
-#[derive(Clone, Copy)]
-pub(crate) struct Effects<'a> {
-    pub(crate) list: &'a [Box<dyn Effect>],
-    pub(crate) hooks: Hooks,
-}
-
-impl<'a> Effects<'a> {
-    pub(crate) fn new(list: &'a [Box<dyn Effect>]) -> Self {
-        Self { list, hooks: Hooks::of(list) }
-    }
-
+impl Effects<'_> {
     /// Mass and loads of a body during the coming control step.
     pub(crate) fn apply(self, physics: &mut PhysicsWorld, config: &WorldConfig, body: &Body, time_secs: f64) {
         if !body.dynamic {

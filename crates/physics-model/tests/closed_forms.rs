@@ -4,10 +4,10 @@
 //! that friction stops from speed v comes v h / 2 short of v² / (2 μ g), because its position follows the speed at the end of each
 //! substep. Expectations below contain that term.
 
-use physics_model::action::minimum_jerk;
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::effect::Effect;
 use physics_model::effects::{RollingResistance, TableTilt};
+use physics_model::motion::minimum_jerk;
 use physics_model::robot::ToolShape;
 use physics_model::world::{ToolPose, World, Wrench};
 use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};

@@ -1,9 +1,9 @@
 //! Effects on bodies and contacts in rapier worlds, against closed forms. Settings are those of `scenarios/base.toml` unless a test says so.
 
-use physics_model::action::minimum_jerk;
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::effect::Effect;
 use physics_model::effects::*;
+use physics_model::motion::minimum_jerk;
 use physics_model::robot::ToolShape;
 use physics_model::world::{ToolPose, World, Wrench};
 use physics_model::{BodyState, ObjectShape, ObjectTheta, Theta};

@@ -2,11 +2,11 @@
 
 #[path = "support/rigs.rs"]
 mod rigs;
-mod support;
+#[path = "support/robots.rs"]
+mod robots;
 
 use std::sync::Arc;
 
-use physics_model::config::ObstacleMobility;
 use physics_model::effect::{Effect, EffectKind};
 use physics_model::rig::{Prism, Rig, RigError, RigObject, RigReading, RigShape, RigStart, RigTool};
 use physics_model::world::Divergence;
@@ -305,10 +305,12 @@ fn a_slow_sensor_shows_every_force_filtered() {
 }
 
 fn arm(name: &str) -> (Rig, BodyState, [f64; 3]) {
-    let (model, _) = support::model(name, ObstacleMobility::Fixed);
-    let tool_m = model.config().task.tool_start_m;
-    let mut rig = rig(RigTool::Arm(Arc::new(model.robot().clone())));
-    rig.world.table_height_m = model.config().world.table_height_m;
+    let (tool_m, table_height_m) = match name {
+        "sawyer" => ([0.53, -0.22, -0.05], -0.1),
+        _ => ([0.46, -0.26, 0.05], 0.0),
+    };
+    let mut rig = rig(RigTool::Arm(Arc::new(robots::robot(name))));
+    rig.world.table_height_m = table_height_m;
     let at = [tool_m[0], tool_m[1] + 0.1, rig.world.table_height_m + SIZE_M[2] / 2.0];
     (rig, BodyState::at_rest(at, 0.0), tool_m)
 }

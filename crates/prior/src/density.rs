@@ -1,9 +1,11 @@
 //! The density of suggestions in the coordinates of a belief filter: what importance weights need.
 
 use physics_model::config::ObstacleMobility;
-use physics_model::state::{BODY_LEN, State};
+use physics_model::state::BODY_LEN;
 use physics_model::theta::THETA_LEN;
-use physics_model::{ObjectShape, Particle, Theta};
+use physics_model::{ObjectShape, Theta};
+use push_task::Particle;
+use push_task::state::State;
 
 use crate::features;
 use crate::{Draw, Layout, Mixture};

@@ -13,11 +13,13 @@
 #[cfg(feature = "training")]
 mod episodes;
 
-use physics_model::action::ACTION_COUNT;
-use physics_model::sensor::observation_names;
-use physics_model::state::{BODY_LEN, State};
+use physics_model::state::BODY_LEN;
 use physics_model::theta::{CLASS_TARGETS, THETA_LEN, THETA_NAMES};
-use physics_model::{Action, BodyState, ObjectShape, Particle, PushModel, Theta};
+use physics_model::{BodyState, ObjectShape, Theta};
+use push_task::action::ACTION_COUNT;
+use push_task::sensor::observation_names;
+use push_task::state::State;
+use push_task::{Action, Particle, PushModel};
 
 use crate::mixture::Draw;
 use crate::{ClassTarget, Layout, Transform};
@@ -214,7 +216,7 @@ fn settle(body: &mut BodyState, shape: ObjectShape, size_m: [f64; 3], table_heig
 
 #[cfg(all(test, feature = "training"))]
 mod tests {
-    use physics_model::config::ForceSensing;
+    use push_task::config::ForceSensing;
 
     use dataset::{Episode, Schema};
 

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use physics_model::config::ObstacleMobility;
-use physics_model::{Action, Observation, Particle, PushModel};
 use pomdp::{Prior, Rng};
+use push_task::{Action, Observation, Particle, PushModel};
 
 use crate::checkpoint::{Checkpoint, FILE};
 use crate::density;

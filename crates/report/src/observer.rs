@@ -4,7 +4,8 @@ use agent::{Glimpse, Watcher};
 use belief::Particles;
 use nalgebra::Isometry3;
 use physics_model::robot::{Robot, ToolShape};
-use physics_model::{BodyState, ObjectShape, Particle, PushModel};
+use physics_model::{BodyState, ObjectShape};
+use push_task::{Particle, PushModel};
 use recording::{
     Body, BodyShape, Ghost, Moment, Pose, RootAction, Scene, SeenBelief, SeenParameter, SeenSearch, ToolPart,
 };

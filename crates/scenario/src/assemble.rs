@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use physics_model::config::ForceSensing;
 use physics_model::robot::Robot;
-use physics_model::{Observation, Particle, PushModel, WorldDistribution};
 use pomdp::Rng;
+use push_task::config::ForceSensing;
+use push_task::{Observation, Particle, PushModel, WorldDistribution};
 
 use crate::schema::InitialObstacle;
 use crate::{Error, Scenario};
@@ -89,7 +89,7 @@ impl Problem {
         let (position, orientation) = self.model.unread_pose(observation.object_pose());
         let noise = &self.scenario.sensor.noise;
         let mut pinned = self.beliefs.clone();
-        let pin = |value: f64, stddev: f64| physics_model::sampling::TruncatedNormal {
+        let pin = |value: f64, stddev: f64| push_task::sampling::TruncatedNormal {
             mean: value,
             stddev,
             low: value - 4.0 * stddev,

@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use physics_model::WorldDistribution;
-use physics_model::config::{
-    ArmConfig, ModelErrorConfig, ObstacleMobility, PerturbConfig, PushConfig, SensorConfig, TaskConfig, WorldConfig,
-};
+use physics_model::config::{ArmConfig, ObstacleMobility, WorldConfig};
 use physics_model::effect::EffectConfig;
 use physics_model::robot::RobotConfig;
+use push_task::WorldDistribution;
+use push_task::config::{ModelErrorConfig, PerturbConfig, PushConfig, SensorConfig, TaskConfig};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -157,7 +156,7 @@ pub struct AgentConfig {
 pub enum Rollouts {
     /// The tool goes to the object's centre, as published. What follows a cut rollout counts as 0.
     Heuristic,
-    /// [`physics_model::GoalPolicy`]: pushes to the goal, past the obstacle of its particle. What follows a cut rollout
+    /// [`push_task::GoalPolicy`]: pushes to the goal, past the obstacle of its particle. What follows a cut rollout
     /// counts as the policy's leaf value.
     Goal,
 }
@@ -170,7 +169,7 @@ pub struct DataConfig {
     pub movable_share: f64,
     /// Actions in an episode; fewer if the world diverges. Reaching the goal does not end it.
     pub episode_actions: usize,
-    /// Share of the episodes played by [`physics_model::GoalPolicy`], the others by the heuristic policy.
+    /// Share of the episodes played by [`push_task::GoalPolicy`], the others by the heuristic policy.
     pub goal_share: f64,
     /// Share of uniformly random actions in every episode.
     pub exploration_share: f64,

@@ -1,8 +1,8 @@
 //! The filter that a scenario chooses.
 
 use belief::{Particles, RejectionFilter, WeightedFilter};
-use physics_model::{Action, Observation, Particle, PushModel};
 use pomdp::{Proposals, Rng, UpdateReport, Updater as _};
+use push_task::{Action, Observation, Particle, PushModel};
 
 use crate::{Error, Filter, Problem};
 

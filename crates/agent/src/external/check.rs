@@ -1,7 +1,7 @@
 //! Which values of a world are believed: those that this arm's sensors could have measured.
 
-use physics_model::Observation;
-use physics_model::sensor::observation_names;
+use push_task::Observation;
+use push_task::sensor::observation_names;
 use scenario::Problem;
 
 use super::WorldError;

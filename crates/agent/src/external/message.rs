@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use physics_model::config::{ForceSensing, GoalConfig, NoiseConfig, ObstacleMobility, ReachConfig};
+use physics_model::config::ObstacleMobility;
 use physics_model::robot::ToolShape;
-use physics_model::sensor::observation_names;
-use physics_model::{Action, WorldDistribution};
+use push_task::config::{ForceSensing, GoalConfig, NoiseConfig, ReachConfig};
+use push_task::sensor::observation_names;
+use push_task::{Action, WorldDistribution};
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 

@@ -12,9 +12,9 @@ mod process;
 
 use std::time::Duration;
 
-use physics_model::reward::Events;
-use physics_model::{Action, ActionReport, Observation, Particle};
 use pomdp::Outcome;
+use push_task::reward::Events;
+use push_task::{Action, ActionReport, Observation, Particle};
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 

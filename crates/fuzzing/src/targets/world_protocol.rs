@@ -7,7 +7,7 @@ use std::thread;
 use std::time::Duration;
 
 use agent::{ExternalWorld, Timeouts, World as _, WorldAddress};
-use physics_model::Action;
+use push_task::Action;
 use scenario::{Problem, Selection};
 
 use crate::Verdict;

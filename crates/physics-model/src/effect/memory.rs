@@ -3,8 +3,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::sensor::unit;
-use crate::state::{BodyState, MAX_JOINTS};
+use crate::state::{BodyState, MAX_JOINTS, unit_quaternion};
 
 /// Part of a hypothesis where a listed effect needs it; absent otherwise.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,18 +29,20 @@ impl Default for Memory {
 
 impl Memory {
     /// Notes that `seen` was read of a body that is at `now`.
-    pub(crate) fn note_lag(&mut self, seen: &BodyState, now: &BodyState) {
+    pub fn note_lag(&mut self, seen: &BodyState, now: &BodyState) {
         self.lag_m = std::array::from_fn(|i| seen.position_m[i] - now.position_m[i]);
-        self.lag_rad = (unit(seen.orientation) * unit(now.orientation).inverse()).scaled_axis().into();
+        self.lag_rad =
+            (unit_quaternion(seen.orientation) * unit_quaternion(now.orientation).inverse()).scaled_axis().into();
     }
 
     /// Moves a body to where the lag lets it appear.
-    pub(crate) fn apply_lag(&self, body: &mut BodyState) {
+    pub fn apply_lag(&self, body: &mut BodyState) {
         for (position, lag) in body.position_m.iter_mut().zip(self.lag_m) {
             *position += lag;
         }
         if self.lag_rad != [0.0; 3] {
-            let turned = UnitQuaternion::from_scaled_axis(Vector3::from(self.lag_rad)) * unit(body.orientation);
+            let turned =
+                UnitQuaternion::from_scaled_axis(Vector3::from(self.lag_rad)) * unit_quaternion(body.orientation);
             body.orientation = [turned.i, turned.j, turned.k, turned.w];
         }
     }

@@ -145,7 +145,7 @@ impl PoseChain {
     }
 
     /// The delay alone.
-    pub(crate) fn seen(&mut self, body: &BodyState) -> BodyState {
+    pub fn seen(&mut self, body: &BodyState) -> BodyState {
         self.0.as_mut().map_or(*body, |line| line.push(*body))
     }
 }

@@ -12,8 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, Hooks};
-use crate::sensor::unit;
-use crate::state::BodyState;
+use crate::state::{BodyState, unit_quaternion};
 
 /// The pose sensor's frame is turned; see the module of the same name for ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -32,7 +31,7 @@ fn turn(body: &mut BodyState, yaw_rad: f64) {
     for v in [&mut body.position_m, &mut body.linear_mps, &mut body.angular_rps] {
         *v = (rotation * Vector3::from(*v)).into();
     }
-    let turned = rotation * unit(body.orientation);
+    let turned = rotation * unit_quaternion(body.orientation);
     body.orientation = [turned.i, turned.j, turned.k, turned.w];
 }
 

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::effect::parameter::{Neutral, Parameter, parametric};
 use crate::effect::{Effect, ForceFilter, Hooks, ToolMoment};
-use crate::sensor::unit;
+use crate::state::unit_quaternion;
 use crate::world::Wrench;
 
 /// The hand carries an unknown mass; see the module of the same name for ranges.
@@ -56,7 +56,7 @@ impl ForceFilter for WristPayload {
     fn apply(&mut self, moment: &ToolMoment, wrench: &mut Wrench) {
         let gravity = Vector3::new(0.0, 0.0, -moment.gravity_mps2);
         let force = (gravity - Vector3::from(moment.acceleration_mps2)) * self.mass_kg;
-        let arm = unit(moment.orientation) * Vector3::new(self.com_x_m, self.com_y_m, self.com_z_m);
+        let arm = unit_quaternion(moment.orientation) * Vector3::new(self.com_x_m, self.com_y_m, self.com_z_m);
         wrench.add_scaled(&Wrench { force_n: force.into(), torque_nm: arm.cross(&force).into() }, 1.0);
     }
 }

@@ -1,6 +1,6 @@
 //! The rig of a measured log, tick by tick: logged commands in, one reading per row out.
 //!
-//! [`crate::PushModel`] simulates discrete actions of an arm between which everything settles. A log is one long stretch of commands instead:
+//! The pushing task (crate `push-task`) simulates discrete actions of an arm between which everything settles. A log is one long stretch of commands instead:
 //! its signal chains live as long as the run, and a run may begin anywhere in an episode, from what was measured there and from the commands
 //! before. A run is a pure function of its arguments.
 //!

@@ -4,10 +4,8 @@ use super::drive::{Drive, Postures};
 use super::start::{check_place, check_start, lead_ticks};
 use super::{Rig, RigError, RigObject, RigReading, RigStart, RigTool};
 use crate::effect::signal::{self, ForceChain, PoseChain};
-use crate::effect::{Effect, Nominal, ToolMoment};
-use crate::force::joint_torques;
-use crate::loads::Effects;
-use crate::motion::{JointMoment, ToolMotion};
+use crate::effect::{Effect, Effects, Nominal, ToolMoment};
+use crate::motion::{JointMoment, ToolMotion, joint_torques};
 use crate::robot::{IkError, JointVector, ToolShape};
 use crate::world::{Divergence, ToolPose, World, Wrench};
 

@@ -4,10 +4,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::run::Stop;
 use super::{Rig, RigError, RigTool};
-use crate::effect::Hooks;
-use crate::loads::Effects;
-use crate::sensor::unit;
-use crate::state::BodyState;
+use crate::effect::{Effects, Hooks};
+use crate::state::{BodyState, unit_quaternion};
 use crate::world::Divergence;
 
 /// Farthest place, m, and fastest spin, rad/s, that is looked at: what lies beyond leaves the numbers that the engine can reckon with.
@@ -30,7 +28,7 @@ pub(super) fn lead_ticks(effects: Effects, tick_secs: f64, earlier: usize, body:
         *position -= velocity * back_secs;
     }
     let turn = UnitQuaternion::from_scaled_axis(Vector3::from(body.angular_rps) * -back_secs);
-    let turned = turn * unit(body.orientation);
+    let turned = turn * unit_quaternion(body.orientation);
     body.orientation = [turned.i, turned.j, turned.k, turned.w];
     ticks as usize
 }

@@ -3,10 +3,11 @@
 use dataset::{Episode, Schema};
 
 use physics_model::Theta;
-use physics_model::action::ACTION_COUNT;
-use physics_model::state::{BODY_LEN, MAX_JOINTS, State};
+use physics_model::state::{BODY_LEN, MAX_JOINTS};
 use physics_model::theta::{CLASS_TARGETS, NO_OBSTACLE, THETA_LEN, THETA_NAMES};
 use pomdp::{Purpose, Seed};
+use push_task::action::ACTION_COUNT;
+use push_task::state::State;
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
 

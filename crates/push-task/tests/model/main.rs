@@ -6,10 +6,8 @@ mod unknown_effects;
 
 use physics_model::config::ObstacleMobility;
 use physics_model::world::World;
-use physics_model::{
-    Action, BodyState, GoalPolicy, HeuristicPolicy, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushModel,
-    State, Theta,
-};
+use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
+use push_task::{Action, GoalPolicy, HeuristicPolicy, Particle, PushModel, State};
 
 use pomdp::conformance::{
     check_generative_model, check_observation_model, check_parameters_stay, check_static_parameters,
@@ -97,7 +95,7 @@ fn unknown_parameters_of_effects_are_moved_by_filters_and_act() {
     use physics_model::effect::{EffectKind, EffectParameter, EffectValue};
     let (plain, joints) = model("sawyer", ObstacleMobility::Fixed);
     let effects = vec![EffectKind::TableTilt.start(), EffectKind::ForceBias.start()];
-    let config = physics_model::PushConfig { effects, ..plain.config().clone() };
+    let config = push_task::PushConfig { effects, ..plain.config().clone() };
     let model = PushModel::new(config, std::sync::Arc::new(plain.robot().clone()));
     let value = |kind, name, value| EffectValue { parameter: EffectParameter::new(kind, name).unwrap(), value };
     let mut tilted = particle(&model, &joints, -0.1);
@@ -291,7 +289,7 @@ fn what_is_skipped_before_and_after_a_contact_changes_nothing() {
         let (config, shapes) = (&model.config().world, model.robot().tool_shapes());
         let mut world = World::restore(config, &[], &start.theta, &start.state.object, None, &pose, shapes);
         for step in 1..=20 {
-            let share = 0.02 * physics_model::action::minimum_jerk(f64::from(step) / 20.0);
+            let share = 0.02 * physics_model::motion::minimum_jerk(f64::from(step) / 20.0);
             world.step(std::array::from_fn(|i| from[i] + share * action.direction()[i]));
         }
         let (ours, whole) = (skipped.state.object, world.object());
@@ -369,7 +367,7 @@ fn the_motion_of_a_free_arm_takes_the_torques_of_its_inverse_dynamics() {
     let (n, duration) = (20, 1.0 / 3.0);
     let start = model.tool_position_m(&joints);
     let at = |time: f64| {
-        let share = physics_model::action::minimum_jerk(time);
+        let share = physics_model::motion::minimum_jerk(time);
         model.joints_for(&joints, [start[0], start[1] + 0.02 * share, start[2]]).unwrap()
     };
     let mut mean = [0.0; 6];

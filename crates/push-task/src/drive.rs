@@ -1,12 +1,12 @@
 //! The way of a command to the arm where an effect changes it.
 
-use crate::effect::signal::CommandChain;
-use crate::effect::{CommandSpace, CommandStart};
-use crate::loads::Effects;
+use physics_model::effect::signal::CommandChain;
+use physics_model::effect::{CommandSpace, CommandStart, Effects};
+use physics_model::motion::{JointMoment, JointPath};
+use physics_model::robot::Robot;
+use physics_model::state::MAX_JOINTS;
+
 use crate::model::Particle;
-use crate::motion::{JointMoment, JointPath};
-use crate::robot::Robot;
-use crate::state::MAX_JOINTS;
 
 /// Effects on commands in an action. Commands are joint positions where the joints' way is known, else places of the tool.
 pub(crate) struct Drive {

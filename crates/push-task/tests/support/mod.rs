@@ -3,12 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use physics_model::config::{
-    ArmConfig, ForceSensing, GoalConfig, ModelErrorConfig, NoiseConfig, ObstacleMobility, PerturbConfig, ReachConfig,
-    RewardConfig, SensorConfig, TaskConfig, WorldConfig,
-};
+use physics_model::config::{ArmConfig, ObstacleMobility, WorldConfig};
 use physics_model::robot::{Robot, RobotConfig};
-use physics_model::{PushConfig, PushModel};
+use push_task::config::{
+    ForceSensing, GoalConfig, ModelErrorConfig, NoiseConfig, PerturbConfig, ReachConfig, RewardConfig, SensorConfig,
+    TaskConfig,
+};
+use push_task::{PushConfig, PushModel};
 
 fn root() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_path_buf()

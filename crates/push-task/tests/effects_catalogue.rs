@@ -6,11 +6,9 @@ use std::sync::Arc;
 
 use physics_model::config::{ArmConfig, ObstacleMobility, ServoConfig};
 use physics_model::effect::{EffectKind, Parameter};
-use physics_model::{
-    Action, BodyState, EffectConfig, EffectError, ObjectShape, ObjectTheta, Observation, Particle, PushConfig,
-    PushModel, State, Theta,
-};
+use physics_model::{BodyState, EffectConfig, EffectError, ObjectShape, ObjectTheta, Theta};
 use pomdp::{Outcome, Purpose, Seed};
+use push_task::{Action, Observation, Particle, PushConfig, PushModel, State};
 
 const PLUS_Y: Action = Action::ALL[2];
 const MINUS_Y: Action = Action::ALL[6];

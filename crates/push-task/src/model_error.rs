@@ -1,13 +1,14 @@
 //! The object's pose after an action, between what the model simulated and what was measured.
 
 use nalgebra::{UnitQuaternion, Vector3};
+use physics_model::state::BodyState;
+use physics_model::state::unit_quaternion;
 use pomdp::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use crate::config::{ModelErrorConfig, NoiseConfig};
 use crate::model::Particle;
-use crate::sensor::{Observation, unit};
-use crate::state::BodyState;
+use crate::sensor::Observation;
 
 /// A draw of the object's pose given the simulated one, N(simulated, e²) with the model's error e, and the measured one, N(pose, σ²) with the
 /// sensor's noise σ: for each of x, y and yaw the mean is e² / (e² + σ²) of the way to what was measured, the variance e² σ² / (e² + σ²).
@@ -30,10 +31,11 @@ pub(crate) fn corrected(
     for (simulated, measured) in object.position_m[..2].iter_mut().zip(measured_m) {
         *simulated += draw(measured - *simulated, error.position_m, noise.position_m);
     }
-    let turn = unit(measured) * unit(object.orientation).inverse();
+    let turn = unit_quaternion(measured) * unit_quaternion(object.orientation).inverse();
     let yaw_rad = draw(turn.scaled_axis().z, error.yaw_rad, noise.orientation_rad);
     if yaw_rad != 0.0 {
-        let turned = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, yaw_rad)) * unit(object.orientation);
+        let turned =
+            UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, yaw_rad)) * unit_quaternion(object.orientation);
         object.orientation = [turned.i, turned.j, turned.k, turned.w];
     }
     object
@@ -46,7 +48,7 @@ mod tests {
     use super::*;
     use crate::sensor::tests::NOISE;
     use crate::state::State;
-    use crate::theta::{ObjectShape, ObjectTheta, Theta};
+    use physics_model::theta::{ObjectShape, ObjectTheta, Theta};
 
     fn simulated() -> Particle {
         let object = ObjectTheta {
@@ -76,7 +78,7 @@ mod tests {
             .map(|_| {
                 let object = corrected(&error, &NOISE, &simulated(), &measured(), &mut rng);
                 assert_eq!(object.position_m[2], 0.04);
-                let yaw = unit(object.orientation).euler_angles().2;
+                let yaw = unit_quaternion(object.orientation).euler_angles().2;
                 [object.position_m[0], object.position_m[1], yaw]
             })
             .collect();

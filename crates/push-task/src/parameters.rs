@@ -1,10 +1,10 @@
 //! Static parameters of a hypothesis for belief filters: Θ, and the pose of an obstacle that cannot move.
 
+use physics_model::config::ObstacleMobility;
+use physics_model::theta::{ObjectShape, standard_com_m};
 use pomdp::{Partition, StaticParameters};
 
-use crate::config::ObstacleMobility;
 use crate::model::{Particle, PushModel};
-use crate::theta::{ObjectShape, standard_com_m};
 
 /// Share of an open interval at whose ends a bounded value is held, so that its logit stays finite.
 const EDGE: f64 = 1e-6;

@@ -6,9 +6,10 @@ use std::sync::OnceLock;
 
 use physics_model::config::ObstacleMobility;
 use physics_model::feasible::check_theta;
-use physics_model::{Action, BodyState, Particle, PushModel, State, Theta};
+use physics_model::{BodyState, Theta};
 use pomdp::{Outcome, Purpose, Seed};
 use proptest::prelude::*;
+use push_task::{Action, Particle, PushModel, State};
 
 const CASES: u32 = 25_000;
 

@@ -3,26 +3,27 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use physics_model::config::ArmConfig;
+use physics_model::effect::{Effect, EffectConfig, Effects, Hooks, Memory, Nominal, ToolMoment, signal, unknown};
+use physics_model::error::Impossible;
+use physics_model::feasible::{check_overlaps, check_theta};
+use physics_model::motion::JointPath;
+use physics_model::robot::Robot;
+use physics_model::state::BodyState;
+use physics_model::theta::Theta;
+use physics_model::world::{Divergence, ToolPose};
 use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng, Step};
 use serde::{Deserialize, Serialize};
 
 use crate::action::Action;
-use crate::config::{ArmConfig, ForceSensing, PushConfig};
-use crate::effect::{Effect, EffectConfig, Hooks, Memory, Nominal, ToolMoment, signal, unknown};
-use crate::error::Impossible;
-use crate::feasible::{check_overlaps, check_theta};
+use crate::config::{ForceSensing, PushConfig};
 use crate::force::{ForceSensor, resting_reading};
-use crate::loads::Effects;
 use crate::model_error;
-use crate::motion::JointPath;
 use crate::perturb;
 use crate::reward::Events;
-use crate::robot::Robot;
 use crate::sensor::{Observation, ObservationKey, Readings};
 use crate::simulation::{Course, Simulation};
-use crate::state::{BodyState, State};
-use crate::theta::Theta;
-use crate::world::{Divergence, ToolPose};
+use crate::state::State;
 
 /// Attempts at moving a hypothesis to a possible one.
 const PERTURB_DRAWS: usize = 5;

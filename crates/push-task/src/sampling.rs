@@ -1,5 +1,7 @@
 //! Distributions of Θ and of the initial state: truncated Gaussian, Gamma and categorical draws.
 
+use physics_model::state::BodyState;
+use physics_model::theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta, standard_com_m};
 use pomdp::Rng;
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, Gamma};
@@ -7,10 +9,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{Continuous as _, ContinuousCDF as _, Normal};
 
-use crate::effect::{EffectDistributions, unknown};
+pub use self::effects::EffectDistributions;
 use crate::model::{Particle, PushModel};
-use crate::state::{BodyState, State};
-use crate::theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta, standard_com_m};
+use crate::state::State;
+
+pub mod effects;
 
 /// Drawn masses are kept in these ranges, kg: a Gamma distribution has no largest value, and the solver no use for a gram.
 const OBJECT_MASS_KG: [f64; 2] = [0.02, 20.0];
@@ -225,7 +228,7 @@ impl WorldDistribution {
                 let f = &o.friction;
                 (f.low < 0.0 || f.high > 1.0).then(|| "object.friction: expected a range within [0, 1]".into())
             })
-            .or_else(|| unknown::problem(&self.effects))
+            .or_else(|| effects::problem(&self.effects))
     }
 
     /// Draws Θ and the poses; nothing is checked for overlap.
@@ -256,7 +259,7 @@ impl WorldDistribution {
             (ObstacleTheta { shape, mass_kg, size_m }, BodyState::at_rest(position, b.yaw_rad.sample(rng)))
         });
         let (obstacle_theta, obstacle_state) = obstacle.unzip();
-        let effects = unknown::sample(&self.effects, rng);
+        let effects = effects::sample(&self.effects, rng);
         Particle::new(
             State { joints_rad: joints_rad.to_vec(), object, obstacle: obstacle_state },
             Theta {
@@ -285,7 +288,7 @@ impl WorldDistribution {
 /// allowance first.
 fn separate(model: &PushModel, particle: &Particle) -> bool {
     let mut grown = particle.clone();
-    let margin = 2.0 * crate::feasible::OVERLAP_LIMIT_M;
+    let margin = 2.0 * physics_model::feasible::OVERLAP_LIMIT_M;
     let grow = |shape: ObjectShape, size_m: &mut [f64; 3]| match shape {
         ObjectShape::Box => {
             size_m[0] += margin;

@@ -4,10 +4,9 @@ mod support;
 
 use physics_model::config::ObstacleMobility;
 use physics_model::theta::standard_com_m;
-use physics_model::{
-    Action, BodyState, HeuristicPolicy, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushModel, State, Theta,
-};
+use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
 use pomdp::{Outcome, Policy as _, Purpose, Seed};
+use push_task::{Action, HeuristicPolicy, Particle, PushModel, State};
 use rand::RngExt as _;
 
 /// A hypothesis on the way of a push: every third with an obstacle.

@@ -61,28 +61,6 @@ impl From<Action> for u8 {
     }
 }
 
-/// Share of a minimum-jerk move that is done after the share `time` in [0, 1] of its duration (Flash and Hogan 1985):
-/// 10 t³ − 15 t⁴ + 6 t⁵.
-#[must_use]
-pub fn minimum_jerk(time: f64) -> f64 {
-    let t = time.clamp(0.0, 1.0);
-    t * t * t * (10.0 - 15.0 * t + 6.0 * t * t)
-}
-
-/// First derivative of [`minimum_jerk`] by `time`: 30 t² (1 − t)².
-#[must_use]
-pub fn minimum_jerk_rate(time: f64) -> f64 {
-    let t = time.clamp(0.0, 1.0);
-    30.0 * t * t * (1.0 - t) * (1.0 - t)
-}
-
-/// Second derivative of [`minimum_jerk`] by `time`: 60 t (1 − t) (1 − 2 t).
-#[must_use]
-pub fn minimum_jerk_acceleration(time: f64) -> f64 {
-    let t = time.clamp(0.0, 1.0);
-    60.0 * t * (1.0 - t) * (1.0 - 2.0 * t)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -98,23 +76,5 @@ mod tests {
             assert!(a.iter().zip(b).all(|(x, y)| x + y == 0.0), "{a:?} {b:?}");
         }
         assert!(Action::try_from(10).is_err());
-    }
-
-    #[test]
-    fn minimum_jerk_starts_and_ends_at_rest_with_no_acceleration() {
-        let h = 1e-4;
-        for t in [0.1, 0.4, 0.7] {
-            let rate = (minimum_jerk(t + h) - minimum_jerk(t - h)) / (2.0 * h);
-            let acceleration = (minimum_jerk_rate(t + h) - minimum_jerk_rate(t - h)) / (2.0 * h);
-            assert!((rate - minimum_jerk_rate(t)).abs() < 1e-6);
-            assert!((acceleration - minimum_jerk_acceleration(t)).abs() < 1e-5);
-        }
-        assert_eq!(minimum_jerk(0.0), 0.0);
-        assert_eq!(minimum_jerk(1.0), 1.0);
-        assert!((minimum_jerk(0.5) - 0.5).abs() < 1e-15);
-        // Velocity 1.875 of the mean at the middle (closed form), 0 at the ends; acceleration O(h) at the ends.
-        assert!(((minimum_jerk(0.5 + h) - minimum_jerk(0.5 - h)) / (2.0 * h) - 1.875).abs() < 1e-6);
-        assert!(minimum_jerk(h) / h < 1e-6);
-        assert!((1.0 - minimum_jerk(1.0 - h)) / h < 1e-6);
     }
 }

@@ -2,9 +2,10 @@
 
 use physics_model::config::ObstacleMobility;
 use physics_model::effect::{EffectKind, EffectParameter, EffectValue};
-use physics_model::{Action, EffectConfig, ObjectShape, Particle, PushConfig, PushModel};
+use physics_model::{EffectConfig, ObjectShape};
 use pomdp::conformance::check_static_parameters;
 use pomdp::{Purpose, Seed};
+use push_task::{Action, Particle, PushConfig, PushModel};
 
 use crate::support::model;
 use crate::{PLUS_Y, particle};

@@ -1,11 +1,11 @@
 //! A policy that knows the task: bring the tool behind the object, then push it towards the goal, round an obstacle in the way.
 
 use nalgebra::Vector2;
+use physics_model::robot::ToolShape;
 use pomdp::{ActionPrior, Policy, Rng};
 
 use crate::action::Action;
 use crate::model::{Particle, PushModel};
-use crate::robot::ToolShape;
 
 /// Of the object's radius, how far the tool may be off the line through the object and the goal and still push.
 const PUSHING_SHARE: f64 = 0.4;

@@ -1,18 +1,18 @@
 //! One action: the tool moves along its course through a world built for it.
 
-use crate::action::minimum_jerk;
-use crate::config::{ArmConfig, ObstacleMobility, WorldConfig};
+use physics_model::config::{ArmConfig, ObstacleMobility, WorldConfig};
+use physics_model::effect::signal::PoseChain;
+use physics_model::effect::{Effects, Hooks, Nominal, ToolMoment};
+use physics_model::feasible::{check_overlaps, nothing_happens, parts_in_reach};
+use physics_model::motion::minimum_jerk;
+use physics_model::motion::{JointMoment, JointPath, ToolMotion};
+use physics_model::state::{BodyState, MAX_JOINTS};
+use physics_model::theta::Theta;
+use physics_model::world::{Divergence, ToolPose, World, Wrench};
+
 use crate::drive::Drive;
-use crate::effect::signal::PoseChain;
-use crate::effect::{Hooks, Nominal, ToolMoment};
-use crate::feasible::{check_overlaps, nothing_happens, parts_in_reach};
 use crate::force::ForceSensor;
-use crate::loads::Effects;
 use crate::model::{ActionReport, Particle, PushModel};
-use crate::motion::{JointMoment, JointPath, ToolMotion};
-use crate::state::{BodyState, MAX_JOINTS};
-use crate::theta::Theta;
-use crate::world::{Divergence, ToolPose, World, Wrench};
 
 /// Control steps between two looks at whether anything will still happen in an action.
 const QUIET_CHECK_STEPS: u32 = 4;
@@ -289,7 +289,7 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    fn check_overlaps(&self, tool: &ToolPose) -> Result<(), crate::error::Impossible> {
+    fn check_overlaps(&self, tool: &ToolPose) -> Result<(), physics_model::Impossible> {
         let state = &self.particle.state;
         let shapes = self.model.robot().tool_shapes();
         check_overlaps(self.config, self.theta, &state.object, state.obstacle.as_ref(), tool, shapes)

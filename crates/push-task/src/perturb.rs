@@ -1,12 +1,12 @@
 //! Artificial noise of particle reinvigoration: zero-mean Gaussian noise on every uncertain value, kept in its range.
 
+use physics_model::state::BodyState;
+use physics_model::theta::{ObjectShape, standard_com_m};
 use pomdp::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
 use crate::config::PerturbConfig;
 use crate::model::Particle;
-use crate::state::BodyState;
-use crate::theta::{ObjectShape, standard_com_m};
 
 /// Smallest size and mass that noise may lead to.
 const SMALLEST_SIZE_M: f64 = 0.01;
@@ -91,7 +91,7 @@ mod tests {
 
     use super::*;
     use crate::state::State;
-    use crate::theta::{ObjectTheta, Theta};
+    use physics_model::theta::{ObjectTheta, Theta};
 
     #[test]
     fn noise_has_the_stated_width_and_keeps_the_object_on_the_table() {

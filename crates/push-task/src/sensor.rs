@@ -1,12 +1,12 @@
 //! Observations: continuous values for the network, their 8-bit subset for the search tree.
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
+use physics_model::state::{BodyState, unit_quaternion};
+use pomdp::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{ForceSensing, ModelErrorConfig, SensorConfig};
-use crate::state::BodyState;
-use pomdp::Rng;
 
 /// Largest index of a discretised value: 8 bits.
 const BINS: f64 = 255.0;
@@ -100,7 +100,7 @@ impl SensorConfig {
         values.extend(readings.object.position_m.iter().map(|p| p + normal(noise.position_m)));
         let turn =
             Vector3::new(normal(noise.orientation_rad), normal(noise.orientation_rad), normal(noise.orientation_rad));
-        let measured = UnitQuaternion::from_scaled_axis(turn) * unit(readings.object.orientation);
+        let measured = UnitQuaternion::from_scaled_axis(turn) * unit_quaternion(readings.object.orientation);
         // A rotation has two quaternions: the one with w ≥ 0 is reported.
         let sign = if measured.w < 0.0 { -1.0 } else { 1.0 };
         values.extend([measured.i, measured.j, measured.k, measured.w].map(|v| sign * v));
@@ -140,7 +140,7 @@ impl SensorConfig {
                 for (slot, t) in key[..3].iter_mut().zip(&values[joints - 3..joints]) {
                     *slot = discretise(*t, TORQUE_RANGE_NM);
                 }
-                let (roll, pitch, yaw) = unit(orientation).euler_angles();
+                let (roll, pitch, yaw) = unit_quaternion(orientation).euler_angles();
                 for (slot, angle) in key[6..].iter_mut().zip([roll, pitch, yaw]) {
                     *slot = discretise(angle, ORIENTATION_RANGE_RAD);
                 }
@@ -186,7 +186,7 @@ impl SensorConfig {
         for ((value, p), stddev) in position.iter().zip(readings.object.position_m).zip(stddevs) {
             add(value - p, stddev);
         }
-        let turn = unit(orientation) * unit(readings.object.orientation).inverse();
+        let turn = unit_quaternion(orientation) * unit_quaternion(readings.object.orientation).inverse();
         let stddevs = [noise.orientation_rad, noise.orientation_rad, noise.orientation_rad.hypot(error.yaw_rad)];
         for (component, stddev) in turn.scaled_axis().iter().zip(stddevs) {
             add(*component, stddev);
@@ -205,10 +205,6 @@ fn discretise(value: f64, range: f64) -> u8 {
     let share = (value.clamp(-range, range) + range) / (2.0 * range);
     // NaN becomes 0 by Rust's casting rule; diverged worlds never get here with one.
     (share * BINS).floor() as u8
-}
-
-pub(crate) fn unit([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
-    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
 }
 
 #[cfg(test)]
@@ -337,7 +333,7 @@ pub(crate) mod tests {
             truth.object.position_m[0] += 0.003 * normal();
             truth.object.position_m[1] += 0.003 * normal();
             let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, 0.02 * normal()));
-            let turned = turn * unit(truth.object.orientation);
+            let turned = turn * unit_quaternion(truth.object.orientation);
             truth.object.orientation = [turned.i, turned.j, turned.k, turned.w];
             total += sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &simulated, &error);
         }

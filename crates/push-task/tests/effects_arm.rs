@@ -9,10 +9,9 @@ use physics_model::config::{ArmConfig, ObstacleMobility, ServoConfig};
 use physics_model::effects::*;
 use physics_model::robot::ToolShape;
 use physics_model::world::{ToolPose, World};
-use physics_model::{
-    Action, BodyState, EffectConfig, ObjectShape, ObjectTheta, Particle, PushConfig, PushModel, State, Theta,
-};
+use physics_model::{BodyState, EffectConfig, ObjectShape, ObjectTheta, Theta};
 use pomdp::{Purpose, Rng, Seed};
+use push_task::{Action, Particle, PushConfig, PushModel, State};
 
 const PLUS_Y: Action = Action::ALL[2];
 const MINUS_Y: Action = Action::ALL[6];
@@ -69,7 +68,7 @@ fn a_soft_arm_lags_by_force_over_stiffness() {
         let far = BodyState::at_rest([1.0, 0.0, 0.05], 0.0);
         let mut world = World::restore(&config, &effects, &theta, &far, None, &tool, &ball);
         for step in 1..=20 {
-            let command = 0.02 * physics_model::action::minimum_jerk(f64::from(step) / 20.0);
+            let command = 0.02 * physics_model::motion::minimum_jerk(f64::from(step) / 20.0);
             world.step([0.0, command, 0.03]);
             assert!((world.tool_position_m()[1] - command).abs() < 1e-6, "step {step}");
         }

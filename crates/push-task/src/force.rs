@@ -1,14 +1,13 @@
 //! What the arm's force sensors read during an action: means over its control steps.
 
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector3;
+use physics_model::effect::signal::ForceChain;
+use physics_model::effect::{Effects, ToolMoment};
+use physics_model::motion::{JointMoment, JointPath, joint_torques};
+use physics_model::robot::Robot;
+use physics_model::world::Wrench;
 
 use crate::config::{ForceSensing, SensorConfig};
-use crate::effect::signal::ForceChain;
-use crate::effect::{Hooks, ToolMoment};
-use crate::loads::Effects;
-use crate::motion::{JointMoment, JointPath};
-use crate::robot::{JointVector, Robot};
-use crate::world::Wrench;
 
 /// Sensor of one action.
 pub(crate) struct ForceSensor<'a> {
@@ -131,19 +130,4 @@ fn wrist_reading(robot: &Robot, joints_rad: &[f64], wrench: &Wrench) -> [f64; 6]
     let force = base_from_wrist.rotation.inverse_transform_vector(&force);
     let torque = base_from_wrist.rotation.inverse_transform_vector(&torque);
     [force.x, force.y, force.z, torque.x, torque.y, torque.z]
-}
-
-/// Torques that the motors give, N·m: M(q) q̈ + C(q, q̇) q̇ + g(q) − Jᵀw, and what effects add; unused places are 0.
-pub(crate) fn joint_torques(robot: &Robot, effects: Effects, moment: &JointMoment, wrench: &Wrench) -> JointVector {
-    let q = moment.position_rad();
-    let mut motion = robot.inverse_dynamics(q, moment.rate_rps(), moment.acceleration_rps2());
-    if effects.hooks.contains(Hooks::JOINT_FRICTION) {
-        for effect in effects.list {
-            effect.joint_friction(moment.rate_rps(), &mut motion);
-        }
-    }
-    let [fx, fy, fz] = wrench.force_n;
-    let [tx, ty, tz] = wrench.torque_nm;
-    let contact = robot.contact_torque(q, &Vector6::new(fx, fy, fz, tx, ty, tz));
-    motion - contact
 }

@@ -5,15 +5,14 @@ mod support;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3, Vector6};
-use physics_model::action::minimum_jerk;
 use physics_model::config::{ArmConfig, ObstacleMobility, ServoConfig};
+use physics_model::motion::minimum_jerk;
 use physics_model::robot::{IkOptions, Robot};
 use physics_model::world::{ToolPose, World, Wrench};
-use physics_model::{
-    Action, BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Particle, PushConfig, PushModel, State, Theta,
-};
+use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
 use pomdp::{Outcome, Purpose, Seed};
 use proptest::prelude::*;
+use push_task::{Action, Particle, PushConfig, PushModel, State};
 
 const ARMS: [&str; 2] = ["sawyer", "jaco"];
 /// The gains that `scenarios/base.toml` names.
