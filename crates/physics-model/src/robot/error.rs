@@ -25,7 +25,7 @@ pub enum RobotError {
         reason: String,
     },
     /// A link of the configuration is not in the URDF, or does not descend from the base link.
-    #[error("robot.{key} = {name:?}: no such link below the base in {}, expected one of {known}", .path.display())]
+    #[error("robot.{key} = {name:?}: no such link below the base in {}, {known}", .path.display())]
     UnknownLink {
         /// URDF.
         path: PathBuf,
@@ -33,11 +33,11 @@ pub enum RobotError {
         key: &'static str,
         /// Name given.
         name: String,
-        /// Names that would do.
+        /// Names that would do, in words.
         known: String,
     },
     /// A joint of the configuration is not in the URDF.
-    #[error("robot.{key} has {name:?}: no such joint in {}, expected one of {known}", .path.display())]
+    #[error("robot.{key} has {name:?}: no such joint in {}, {known}", .path.display())]
     UnknownJoint {
         /// URDF.
         path: PathBuf,
@@ -45,7 +45,7 @@ pub enum RobotError {
         key: &'static str,
         /// Name given.
         name: String,
-        /// Names that would do.
+        /// Names that would do, in words.
         known: String,
     },
     /// A joint cannot play the part that it is given.
@@ -116,9 +116,12 @@ pub enum IkError {
     },
 }
 
-/// Names of a file in a message.
+/// Names of a file in a message: what would do.
 pub(super) fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    whole_file::one_line(&names.collect::<Vec<_>>().join(", "), 600)
+    match names.collect::<Vec<_>>().as_slice() {
+        [] => "which has none at all".into(),
+        names => whole_file::one_line(&format!("expected one of {}", names.join(", ")), 600),
+    }
 }
 
 /// A name of a file in a message.

@@ -1,8 +1,10 @@
-//! URDF files: read in bounded memory, time and depth.
+//! URDF files: read in bounded memory, time and depth, and what is wrong with one in words.
 
 use std::path::Path;
 
 use super::RobotError;
+use super::error::{joint_error, link_error};
+use super::xml;
 
 /// Size of a file.
 const MOST_BYTES: u64 = 16 << 20;
@@ -15,13 +17,25 @@ const MOST_LINKS: usize = 1000;
 pub(super) fn read(path: &Path) -> Result<urdf_rs::Robot, RobotError> {
     let bytes = whole_file::read(path, MOST_BYTES)
         .map_err(|error| RobotError::Read { path: path.into(), source: error.source })?;
+    let text = std::str::from_utf8(&bytes).map_err(|error| {
+        let reason = format!("expected UTF-8 text, found another byte at {}", error.valid_up_to());
+        RobotError::Parse { path: path.into(), reason }
+    })?;
+    parse(path, text)
+}
+
+/// Parses the text of the file at `path`.
+fn parse(path: &Path, text: &str) -> Result<urdf_rs::Robot, RobotError> {
     let refuse = |reason: &str| RobotError::Parse { path: path.into(), reason: whole_file::one_line(reason, 300) };
-    let text = std::str::from_utf8(&bytes).map_err(|error| refuse(&error.to_string()))?;
     // The parser calls itself for each level, and so does what frees its tree.
-    if nesting(text) > MOST_LEVELS {
+    if xml::nesting(text) > MOST_LEVELS {
         return Err(refuse(&format!("expected elements at most {MOST_LEVELS} deep")));
     }
-    let description = urdf_rs::read_from_string(text).map_err(|error| refuse(&error.to_string()))?;
+    if let Some(problem) = other_format(text) {
+        return Err(refuse(&problem));
+    }
+    let text = &with_velocities(text);
+    let description = urdf_rs::read_from_string(text).map_err(|error| explain(path, text, &error.to_string()))?;
     let found = description.links.len().max(description.joints.len());
     if found > MOST_LINKS {
         return Err(refuse(&format!("expected at most {MOST_LINKS} links and joints, found {found}")));
@@ -29,22 +43,55 @@ pub(super) fn read(path: &Path) -> Result<urdf_rs::Robot, RobotError> {
     Ok(description)
 }
 
-/// How deep the elements are nested at most; comments and declarations count for nothing.
-fn nesting(text: &str) -> usize {
-    let (mut depth, mut deepest, mut rest) = (0_usize, 0, text);
-    while let Some(start) = rest.find('<') {
-        rest = &rest[start + 1..];
-        if let Some(comment) = rest.strip_prefix("!--") {
-            rest = comment.find("-->").map_or("", |end| &comment[end..]);
-        } else if rest.starts_with('/') {
-            depth = depth.saturating_sub(1);
-        } else if !rest.starts_with(['!', '?']) {
-            deepest = deepest.max(depth + 1);
-            let alone = rest.find('>').is_some_and(|end| rest[..end].ends_with('/'));
-            depth += usize::from(!alone);
+/// What a file is that is no URDF.
+fn other_format(text: &str) -> Option<String> {
+    let root = xml::elements(text).next()?;
+    let expected = "expected a URDF file, whose outermost element is <robot>";
+    let found = match root.name.to_ascii_lowercase().as_str() {
+        // Macros that nobody has expanded; a namespace alone is what xacro leaves behind.
+        "robot" if xml::elements(text).any(|e| e.name.starts_with("xacro:") || e.inside.contains("${")) => {
+            return Some("expected plain URDF, found xacro macros: run `xacro FILE > arm.urdf` first".into());
+        }
+        "robot" => return None,
+        "mujoco" | "mujocoinclude" => "MJCF, the format of MuJoCo".to_string(),
+        "sdf" => "SDF, the format of Gazebo".to_string(),
+        "html" => "a web page: was the download refused?".to_string(),
+        _ => format!("<{}>", whole_file::one_line(root.name, 60)),
+    };
+    Some(format!("{expected}, found {found}"))
+}
+
+/// The text in which every limit of a joint has a velocity: the format asks for one, many files have none, and nothing here uses it.
+fn with_velocities(text: &str) -> String {
+    let mut whole = String::with_capacity(text.len());
+    let mut done = 0;
+    for element in
+        xml::elements(text).filter(|element| element.name == "limit" && element.attribute("velocity").is_none())
+    {
+        whole += &text[done..element.name_end];
+        whole += " velocity=\"inf\"";
+        done = element.name_end;
+    }
+    whole + &text[done..]
+}
+
+/// Which link or joint the parser did not take, and why. The parser says why alone, so each is read for itself.
+fn explain(path: &Path, text: &str, reason: &str) -> RobotError {
+    let plain = |reason: &str| whole_file::one_line(&whole_file::plain(reason), 300);
+    for element in xml::elements(text).filter(|element| element.depth == 1 && ["joint", "link"].contains(&element.name))
+    {
+        let Some(part) = element.whole(text) else { continue };
+        if let Err(error) = urdf_rs::read_from_string(&format!("<robot name=\"part\">{part}</robot>")) {
+            let name = element.attribute("name").unwrap_or("without a name");
+            let problem = plain(&error.to_string());
+            return if element.name == "joint" {
+                joint_error(path, name, &problem)
+            } else {
+                link_error(path, name, &problem)
+            };
         }
     }
-    deepest
+    RobotError::Parse { path: path.into(), reason: plain(reason) }
 }
 
 #[cfg(test)]
@@ -52,11 +99,34 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nesting_counts_open_elements_alone() {
-        assert_eq!(nesting("<?xml version=\"1.0\"?><!-- <a><a><a> --><robot><link/><link><mass/></link></robot>"), 3);
-        assert_eq!(nesting(&"<link/>".repeat(500)), 1);
-        assert_eq!(nesting(&"<link>".repeat(500)), 500);
-        assert_eq!(nesting("<!-- never closed <a><b>"), 0);
+    fn what_is_wrong_is_said_in_words() {
+        const JOINT: &str = "<joint name=\"elbow\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/><limit lower=\"-1\" upper=\"1\" effort=\"5\" velocity=\"1\"/></joint>";
+        let robot = |inside: &str| format!("<?xml version=\"1.0\"?>\n<robot name=\"r\">{inside}</robot>");
+        let cases = [
+            ("<mujoco model=\"arm\"><worldbody/></mujoco>".to_string(), "found MJCF, the format of MuJoCo"),
+            ("<?xml version='1.0'?><sdf version='1.7'/>".into(), "found SDF, the format of Gazebo"),
+            ("<!DOCTYPE html>\n<html><body>404</body></html>".into(), "found a web page"),
+            ("<urdf/>".into(), "whose outermost element is <robot>, found <urdf>"),
+            (robot("<xacro:include filename=\"a\"/>"), "run `xacro FILE > arm.urdf`"),
+            (robot("<link name=\"${prefix}a\"/>"), "found xacro macros"),
+            (robot(&JOINT.replace("<child link=\"b\"/>", "")), "joint \"elbow\" of arm.urdf: `child` is missing"),
+            (robot(&JOINT.replace("\"5\"", "\"strong\"")), "joint \"elbow\" of arm.urdf: "),
+            (robot(&JOINT.replace("revolute", "hinge")), "there is no choice `hinge`"),
+            (
+                robot("<link name=\"hand\"><inertial><mass/></inertial></link>"),
+                "link \"hand\" of arm.urdf: `value` is missing",
+            ),
+            (robot("<link name=\"hand\">").replace("</robot>", ""), "arm.urdf"),
+        ];
+        for (text, expected) in cases {
+            let message = parse(Path::new("arm.urdf"), &text).unwrap_err().to_string();
+            assert!(message.contains(expected), "{text}: {message}");
+            assert!(!message.contains("custom") && !message.contains("field"), "{message}");
+        }
+        // A limit without velocity is a limit.
+        let slow = parse(Path::new("arm.urdf"), &robot(&JOINT.replace(" velocity=\"1\"", ""))).unwrap();
+        assert_eq!((slow.joints[0].limit.upper, slow.joints[0].limit.velocity), (1.0, f64::INFINITY));
+        assert_eq!(parse(Path::new("arm.urdf"), &robot(JOINT)).unwrap().joints[0].limit.velocity, 1.0);
     }
 
     #[test]

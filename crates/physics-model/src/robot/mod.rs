@@ -17,6 +17,7 @@ mod file;
 mod ik;
 mod shapes;
 mod urdf;
+mod xml;
 
 use std::path::Path;
 
@@ -87,7 +88,10 @@ impl Robot {
                     key: key.into(),
                     value: format!("{:?}", whole_file::one_line(name, 100)),
                     expected: whole_file::one_line(
-                        &format!("a link that moves with {:?}", config.actuated_joints.last()),
+                        &format!(
+                            "a link that moves with {:?}",
+                            config.actuated_joints.last().map_or("", String::as_str)
+                        ),
                         200,
                     ),
                 });

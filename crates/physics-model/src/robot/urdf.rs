@@ -108,6 +108,26 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
+    /// Whether an actuated joint or a link with a part to play hangs below `link`, or is it.
+    fn leads_to_the_arm(&self, link: &str) -> bool {
+        let config = self.config;
+        let (mut open, mut seen) = (vec![link], 0);
+        while let Some(next) = open.pop() {
+            seen += 1;
+            let children = self.children.get(next).map_or(&[][..], Vec::as_slice);
+            let named = [&config.tip_link, &config.tool_link, &config.wrist_link].iter().any(|name| *name == next);
+            // A loop is for the walk to find.
+            if named
+                || seen > self.children.len() + 1000
+                || children.iter().any(|j| config.actuated_joints.contains(&j.name))
+            {
+                return true;
+            }
+            open.extend(children.iter().map(|joint| joint.child.link.as_str()));
+        }
+        false
+    }
+
     /// Places `link`, then all below it, depth first.
     fn visit(&mut self, link: &str, segment: Option<usize>, segment_from_link: &Frame) -> Result<(), RobotError> {
         let placed = Placed { segment, segment_from_link: *segment_from_link };
@@ -136,6 +156,8 @@ impl<'a> Walk<'a> {
                 let mount = segment_from_joint.then(&turn);
                 self.segments.push(Segment { mount, inertia: Inertia::zero() });
                 self.visit(&joint.child.link, Some(index), &turn.inverse())?;
+            } else if is_free(joint) && !self.leads_to_the_arm(&joint.child.link) {
+                // An object beside the arm: what it does is not the arm's business.
             } else {
                 let frozen = frozen(joint, self.config.locked_joints.get(&joint.name), self.path)?;
                 self.visit(&joint.child.link, segment, &segment_from_joint.then(&frozen))?;
@@ -143,6 +165,17 @@ impl<'a> Walk<'a> {
         }
         Ok(())
     }
+}
+
+/// Whether a joint leaves what hangs on it free in more than one direction.
+fn is_free(joint: &urdf_rs::Joint) -> bool {
+    matches!(joint.joint_type, JointType::Floating | JointType::Planar | JointType::Spherical)
+}
+
+/// What a joint is called that cannot be used, and what would do.
+fn unusable(kind: &JointType, expected: &str) -> String {
+    let kind = format!("{kind:?}").to_lowercase();
+    format!("is {kind}, expected {expected}")
 }
 
 /// Joints by name, checked to be unique and to form no loop of links.
@@ -174,7 +207,9 @@ fn check_names(config: &RobotConfig, joints: &BTreeMap<&str, &urdf_rs::Joint>, p
     let locked = config.locked_joints.keys().map(|name| ("locked_joints", name));
     for (key, name) in actuated.chain(locked) {
         if !joints.contains_key(name.as_str()) {
-            let moving = joints.values().filter(|j| j.joint_type != JointType::Fixed).map(|j| j.name.as_str());
+            let movable =
+                |kind: &JointType| matches!(kind, JointType::Revolute | JointType::Continuous | JointType::Prismatic);
+            let moving = joints.values().filter(|j| movable(&j.joint_type)).map(|j| j.name.as_str());
             let known = listed(moving);
             return Err(RobotError::UnknownJoint { path: path.into(), key, name: quoted(name), known });
         }
@@ -201,12 +236,17 @@ fn frozen(joint: &urdf_rs::Joint, locked: Option<&f64>, path: &Path) -> Result<F
         (JointType::Fixed, None) => return Ok(Frame::identity()),
         (JointType::Revolute | JointType::Continuous | JointType::Prismatic, Some(position)) => *position,
         (kind, Some(_)) => {
-            let problem = format!("is {kind:?}, expected revolute, continuous or prismatic in robot.locked_joints");
+            let problem = unusable(kind, "revolute, continuous or prismatic in robot.locked_joints");
             return Err(joint_error(path, &joint.name, &problem));
         }
         (kind, None) => {
-            let problem =
-                format!("is {kind:?}, expected it in robot.actuated_joints, or in robot.locked_joints with a value");
+            let expected = match kind {
+                JointType::Revolute | JointType::Continuous | JointType::Prismatic => {
+                    "it in robot.actuated_joints, or in robot.locked_joints with a value"
+                }
+                _ => "fixed, revolute, continuous or prismatic between base and tool: give it another type in the URDF",
+            };
+            let problem = unusable(kind, expected);
             return Err(joint_error(path, &joint.name, &problem));
         }
     };
@@ -251,8 +291,7 @@ fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> 
         JointType::Revolute => (joint.limit.lower, joint.limit.upper),
         JointType::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
         _ => {
-            let problem =
-                format!("is {:?}, expected revolute or continuous in robot.actuated_joints", joint.joint_type);
+            let problem = unusable(&joint.joint_type, "revolute or continuous in robot.actuated_joints");
             return Err(joint_error(path, &joint.name, &problem));
         }
     };
