@@ -23,7 +23,7 @@ pub enum Error {
     },
     /// The weighted filter needs the density of all draws, which is not known of those that were chosen by the observation.
     #[error(
-        "method {method} does not go with belief.filter = \"weighted\", which needs the density of its suggestions: use mixture, no-rnn, oracle or heuristic"
+        "method {method} does not go with belief.filter = \"weighted\", which needs the density of its suggestions: use mixture, no-rnn, oracle or heuristic, or --preset paper"
     )]
     NoDensity {
         /// Method.

@@ -56,7 +56,8 @@ impl Header {
     pub(crate) fn from_metadata(metadata: &Metadata) -> Result<Self, String> {
         let text = |key: &str| metadata.get(key).cloned().ok_or(format!("its metadata lacks the key `{key}`"));
         fn json<T: DeserializeOwned>(key: &str, text: Result<String, String>) -> Result<T, String> {
-            serde_json::from_str(&text?).map_err(|e| format!("its metadata key `{key}` is malformed: {e}"))
+            serde_json::from_str(&text?)
+                .map_err(|e| format!("its metadata key `{key}` is malformed: {}", whole_file::plain(&e.to_string())))
         }
         let version: u32 = json("surmise.version", text("surmise.version"))?;
         if version != VERSION {

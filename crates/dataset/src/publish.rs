@@ -34,7 +34,10 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, bytes: &[u8]) -> Result<T,
     struct Version {
         version: u32,
     }
-    let invalid = |e: serde_json::Error| Error::Json { path: path.to_owned(), reason: one_line(&e.to_string(), 400) };
+    let invalid = |e: serde_json::Error| Error::Json {
+        path: path.to_owned(),
+        reason: one_line(&whole_file::plain(&e.to_string()), 400),
+    };
     let Version { version } = serde_json::from_slice(bytes).map_err(invalid)?;
     if version != VERSION {
         return Err(Error::Version { path: path.to_owned(), found: version });

@@ -18,7 +18,7 @@ use std::path::Path;
 
 use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
-use whole_file::one_line;
+use whole_file::{one_line, plain};
 
 use crate::diagnosis::Diagnosis;
 use crate::error::Error;
@@ -103,7 +103,7 @@ impl ModelFile {
         // Its own display quotes the text over several lines.
         let file: Self = toml::from_str(text).map_err(|error| {
             let line = whole_file::line_of(text, error.span().map_or(0, |span| span.start));
-            refuse(format!("line {line}: {}", error.message()))
+            refuse(format!("line {line}: {}", plain(error.message())))
         })?;
         if file.version != VERSION {
             return Err(refuse(format!("key `version`: expected {VERSION}, found {}", file.version)));
@@ -169,7 +169,7 @@ mod tests {
         let cases: [(&[u8], &str); 7] = [
             (b"version = 1\n[nominal]\na = = 2\n", "line 3"),
             (b"version = 1\n\"a\\nb\" = 1", "a b"),
-            (long.as_bytes(), "unknown field"),
+            (long.as_bytes(), "there is no key"),
             (b"\xff", "utf-8"),
             (b"version = 1\n[nominal]\na = nan\n", "`nominal.a`: expected -1000000 to 1000000, found NaN"),
             (b"version = 1\n[nominal]\na = 1e308\n", "`nominal.a`"),
@@ -182,7 +182,7 @@ mod tests {
             assert!(!message.contains(char::is_control) && message.len() < 1000, "{message:?}");
         }
         let device = ModelFile::read(Path::new("/dev/zero")).unwrap_err().to_string();
-        assert!(device.contains("no plain file"), "{device}");
+        assert!(device.contains("not a plain file"), "{device}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use agent::Method;
 use figures::Figure;
 use scenario::Published;
+use whole_file::plain;
 
 use crate::combined::{Combined, Common, Part};
 use crate::files::file_error;
@@ -41,10 +42,10 @@ impl Archive {
         let file = folder.join("run.json");
         let text = read(&file)?;
         let refused = |file: &PathBuf, message: String| Error::Archive { file: file.clone(), message };
-        let run: RunIdentity = serde_json::from_str(&text).map_err(|e| refused(&file, e.to_string()))?;
+        let run: RunIdentity = serde_json::from_str(&text).map_err(|e| refused(&file, plain(&e.to_string())))?;
         let file = folder.join("scenario.toml");
         // As a table, not a scenario: that of another version of this program is as good to look at.
-        let scenario: toml::Table = toml::from_str(&read(&file)?).map_err(|e| refused(&file, e.message().into()))?;
+        let scenario: toml::Table = toml::from_str(&read(&file)?).map_err(|e| refused(&file, plain(e.message())))?;
         let name = |keys: &[&str]| {
             text_at(&scenario, keys).ok_or_else(|| refused(&file, format!("`{}` is missing", keys.join("."))))
         };

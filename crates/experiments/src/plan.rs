@@ -203,12 +203,16 @@ impl TablePlan {
         }
         let text = std::fs::read_to_string(file).map_err(file_error(file, "reading"))?;
         let problem = |problem: String| Error::Plan { file: file.to_path_buf(), problem: problem.replace('\n', " ") };
-        let head: Head = toml::from_str(&text).map_err(|e| problem(e.to_string()))?;
+        let said = |e: toml::de::Error| {
+            let line = whole_file::line_of(&text, e.span().map_or(0, |span| span.start));
+            problem(format!("line {line}: {}", whole_file::plain(e.message())))
+        };
+        let head: Head = toml::from_str(&text).map_err(said)?;
         if head.version != Some(VERSION) {
             let found = head.version.map_or("none".into(), |version| version.to_string());
             return Err(problem(format!("version: expected {VERSION}, found {found}")));
         }
-        let mut table: Self = toml::from_str(&text).map_err(|e| problem(e.to_string()))?;
+        let mut table: Self = toml::from_str(&text).map_err(said)?;
         table.name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         match table.problem() {
             Some(found) => Err(problem(found)),

@@ -260,7 +260,7 @@ pub(crate) fn parse_trials(file: &Path, text: &[u8]) -> Result<Trials, Error> {
         let record: TrialRecord = serde_json::from_slice(line).map_err(|e| Error::Record {
             file: file.to_path_buf(),
             line: index + 1,
-            message: e.to_string(),
+            message: whole_file::plain(&e.to_string()),
         })?;
         trials.entry((record.method, record.trial)).or_insert(record);
     }

@@ -121,7 +121,7 @@ pub fn write(dir: &Path, log: &Log, format: Format, notes: &Notes) -> Result<(),
 pub(crate) fn open_bounded(path: &Path, limit: u64) -> Result<File, Error> {
     let about = std::fs::metadata(path).map_err(Error::io("read", path))?;
     if !about.is_file() {
-        let source = std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is no plain file");
+        let source = std::io::Error::new(std::io::ErrorKind::InvalidInput, "it is not a plain file");
         return Err(Error::Io { action: "read", path: path.to_owned(), source });
     }
     if about.len() > limit {

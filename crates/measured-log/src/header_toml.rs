@@ -112,7 +112,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
         let line = whole_file::line_of(text, e.span().map_or(0, |span| span.start));
         Error::Syntax {
             path: path.to_owned(),
-            reason: format!("line {line}: {}", whole_file::one_line(e.message(), MESSAGE)),
+            reason: format!("line {line}: {}", whole_file::one_line(&whole_file::plain(e.message()), MESSAGE)),
         }
     })?;
     // The version alone comes first, so that an old file says so instead of listing unknown keys.
@@ -132,7 +132,7 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
         {
             key = if key == "." { name.to_string() } else { format!("{key}.{name}") };
         }
-        Error::Key { path: path.to_owned(), key, reason }
+        Error::Key { path: path.to_owned(), key, reason: whole_file::plain(&reason) }
     })?;
     let mut checked = || -> Result<Header, Problem> {
         let header = Header {

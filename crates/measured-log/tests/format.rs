@@ -69,22 +69,22 @@ fn a_valid_log_is_read_with_its_gaps() {
 fn every_fault_of_the_header_names_its_key() {
     let cases = [
         ("version = 1", "version = 2", "log.toml, key `version`: expected 1, found `2`"),
-        ("\"none\"", "\"panda\"", "key `robot`: unknown variant `panda`, expected one of `sawyer`, `jaco`, `none`"),
+        ("\"none\"", "\"panda\"", "key `robot`: there is no choice `panda`, expected one of `sawyer`, `jaco`, `none`"),
         ("period_secs = 0.01", "period_secs = 0.0", "key `period_secs`: expected 1e-9 to 10, found 0"),
         ("period_secs = 0.01", "period_secs = nan", "key `period_secs`"),
-        ("period_secs = 0.01", "period_ms = 10", "key `period_ms`: unknown field `period_ms`, expected one of"),
+        ("period_secs = 0.01", "period_ms = 10", "key `period_ms`: there is no key `period_ms`, expected one of"),
         ("tool_radius_m = 0.02\n", "", "key `tool_radius_m`: expected the radius"),
         ("tool_radius_m = 0.02", "tool_radius_m = -1", "key `tool_radius_m`: expected 1e-9 to 10"),
-        ("gravity_mps2 = 9.81\n", "", "key `gravity_mps2`: missing field `gravity_mps2`"),
-        ("stddev = 0.04", "sttdev = 0.04", "key `table.friction.sttdev`: unknown field"),
+        ("gravity_mps2 = 9.81\n", "", "key `gravity_mps2`: `gravity_mps2` is missing"),
+        ("stddev = 0.04", "sttdev = 0.04", "key `table.friction.sttdev`: there is no key"),
         ("stddev = 0.04", "stddev = 0.0", "key `table.friction.stddev`: expected more than 0, found 0"),
         ("mean = 0.5", "mean = -0.5", "key `object.mass_kg`: expected 1e-9 to 10000"),
-        ("mass_kg", "mass_g", "key `object.mass_g`: unknown field"),
+        ("mass_kg", "mass_g", "key `object.mass_g`: there is no key"),
         ("[0.08, ", "[0.0, ", "key `object.size_m[0]`: expected 1e-9 to 10, found 0"),
         ("[0.08, ", "[", "key `object.size_m`: expected [x, y, z] for shape = \"box\", found 2 numbers"),
         ("\"box\"", "\"sphere\"", "key `object.size_m`: expected [radius] for shape = \"sphere\", found 3 numbers"),
         ("\"box\"", "\"prism\"", "key `object.size_m`: expected outline_m and height_m"),
-        ("\"box\"", "\"cone\"", "key `object.shape`: unknown variant `cone`"),
+        ("\"box\"", "\"cone\"", "key `object.shape`: there is no choice `cone`"),
         ("com_m = [0.0, 0, 0.0]", "com_m = [0.0, 0]", "key `object.com_m`"),
         (
             "com_m",
@@ -93,7 +93,7 @@ fn every_fault_of_the_header_names_its_key() {
         ),
         ("com_m", "restitution = 2.0\ncom_m", "key `object.restitution`: expected 0 to 1, found 2"),
         ("com_m", "feet_m = []\ncom_m", "key `object.feet_m`: expected only for shape = \"prism\""),
-        ("object_position_m", "object_position_mm", "key `noise.object_position_mm`: unknown field"),
+        ("object_position_m", "object_position_mm", "key `noise.object_position_mm`: there is no key"),
         ("0.0005", "0.0", "key `noise.object_position_m`: expected 1e-9 to"),
         ("fraction = 0.5", "fraction = 1.0", "key `split.holdout_fraction`: expected a number between 0 and 1"),
         ("[split]", "[split", "log.toml cannot be read: line 21"),
@@ -218,7 +218,7 @@ fn a_folder_without_samples_or_with_two_is_refused() {
     assert!(message.starts_with("samples.parquet cannot be decoded as Parquet: "), "{message}");
     std::fs::remove_file(folder.path().join("samples.parquet")).unwrap();
     std::fs::create_dir(folder.path().join("samples.csv")).unwrap();
-    assert!(read_folder(folder.path()).unwrap_err().contains("it is no plain file"));
+    assert!(read_folder(folder.path()).unwrap_err().contains("it is not a plain file"));
 }
 
 #[test]
@@ -370,5 +370,5 @@ fn what_a_message_quotes_is_one_line_and_cut() {
     assert!(refused(&long, b"").contains("log.toml"));
     let torn = [b"\"a\\nb\" = 1\n".as_slice(), header].concat();
     let torn = refused(&torn, b"");
-    assert!(torn.contains("log.toml, key `a b`: unknown field `a b`"), "{torn}");
+    assert!(torn.contains("log.toml, key `a b`: there is no key `a b`"), "{torn}");
 }

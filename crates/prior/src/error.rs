@@ -9,7 +9,7 @@ pub struct Reason(pub(crate) String);
 
 impl From<serde_json::Error> for Reason {
     fn from(error: serde_json::Error) -> Self {
-        Self(whole_file::one_line(&error.to_string(), 400))
+        Self(whole_file::one_line(&whole_file::plain(&error.to_string()), 400))
     }
 }
 

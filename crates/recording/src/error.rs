@@ -15,12 +15,12 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A file that is no trace.
-    #[error("{}: expected the trace of an episode", path.display())]
+    #[error("{}: expected the trace of an episode: {reason}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
         /// What is wrong, and where.
-        source: serde_json::Error,
+        reason: String,
     },
     /// A trace of another version.
     #[error("{}: version is {found}, this program reads version {}", path.display(), crate::VERSION)]

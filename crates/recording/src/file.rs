@@ -35,7 +35,10 @@ pub fn read(path: &Path) -> Result<EpisodeTrace, Error> {
     }
     let refused = |e: whole_file::Error| Error::Read { path: path.to_path_buf(), source: e.source };
     let text = whole_file::read(path, LARGEST_BYTES).map_err(refused)?;
-    let content = |source| Error::Content { path: path.to_path_buf(), source };
+    let content = |error: serde_json::Error| {
+        let reason = whole_file::one_line(&whole_file::plain(&error.to_string()), 400);
+        Error::Content { path: path.to_path_buf(), reason }
+    };
     let Version { version: found } = serde_json::from_slice(&text).map_err(content)?;
     if found != VERSION {
         return Err(Error::Version { path: path.to_path_buf(), found });

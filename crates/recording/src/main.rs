@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 
 /// Makes a recording for the Rerun viewer of an episode of `demo`.
 #[derive(Debug, Parser)]
-#[command(name = "to-rerun", version)]
+#[command(name = "to-rerun", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Folder of the episode, or its trace.json.
     episode: PathBuf,
@@ -16,6 +16,13 @@ struct Arguments {
     #[arg(long)]
     out: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask rerun runs/demo/D4-sawyer-surmise-mixture";
+
+/// How a recording of the viewer begins.
+const MAGIC: &[u8] = b"RRF";
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -32,6 +39,10 @@ fn run(arguments: &Arguments) -> Result<()> {
     let trace_file = if episode.is_dir() { episode.join("trace.json") } else { episode.clone() };
     let trace = recording::read(&trace_file)?;
     let out = arguments.out.clone().unwrap_or_else(|| trace_file.with_file_name("episode.rrd"));
+    // A recording is replaced by a newer one, and nothing else is.
+    if std::fs::read(&out).is_ok_and(|there| !there.starts_with(MAGIC)) {
+        bail!("{}: exists, and is not a recording of the viewer: choose another --out", out.display());
+    }
     let bytes = recording::viewer::recording(&trace)?;
     whole_file::write(&out, &bytes, whole_file::Existing::Replace)
         .with_context(|| format!("cannot write {}", out.display()))?;

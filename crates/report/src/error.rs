@@ -10,12 +10,12 @@ pub enum Error {
     #[error(transparent)]
     Figure(#[from] figures::Error),
     /// A combined table that this version does not understand.
-    #[error("{}: expected a table of this version's `eval --all`, and found one of another ({source}): make it anew with --keep-finished", path.display())]
+    #[error("{}: expected a table of this version's `eval --all`, and found one of another ({reason}): make it anew with --keep-finished", path.display())]
     Table {
         /// The file.
         path: PathBuf,
         /// What is wrong in it.
-        source: serde_json::Error,
+        reason: String,
     },
     /// A folder that holds neither a run nor an episode.
     #[error(

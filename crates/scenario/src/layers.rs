@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use toml::{Table, Value};
-use whole_file::one_line;
+use whole_file::{one_line, plain};
 
 use crate::load::{QUOTED, SENTENCE};
 use crate::suggest::with_nearest;
@@ -74,13 +74,14 @@ impl Layers {
             let mut key = error.path().to_string();
             let message = error.into_inner().to_string();
             let message = message.trim();
-            // serde reports an unknown key on its table: the key itself stands in the message.
-            if let Some(unknown) = message.strip_prefix("unknown field `").and_then(|m| m.split('`').next())
-                && !key.ends_with(unknown)
+            // serde reports an unknown or a missing key on its table: the key itself stands in the message.
+            let named = ["unknown field `", "missing field `"].iter().find_map(|start| message.strip_prefix(start));
+            if let Some(name) = named.and_then(|m| m.split('`').next())
+                && key.rsplit('.').next() != Some(name)
             {
-                key = if key == "." { unknown.to_string() } else { format!("{key}.{unknown}") };
+                key = if key == "." { name.to_string() } else { format!("{key}.{name}") };
             }
-            let message = one_line(&with_nearest(&message.replace('\n', " ")), SENTENCE);
+            let message = one_line(&plain(&with_nearest(&message.replace('\n', " "))), SENTENCE);
             Error::Key { file: self.origin(&key), key: one_line(&key, QUOTED), message }
         })?;
         match problem(&scenario) {
@@ -185,6 +186,7 @@ mod tests {
         assert!(wrong_type.contains("task.horizon") && wrong_type.contains("expected"), "{wrong_type}");
         let wrong_unit = message("task.goal.radius_cm=4");
         assert!(wrong_unit.contains("radius_cm") && wrong_unit.contains("radius_m"), "{wrong_unit}");
+        assert!(wrong_type.ends_with("expected a whole number, 0 or more, found the text \"far\""), "{wrong_type}");
         let range = message("task.discount=1.5");
         assert!(range.contains("task.discount") && range.contains("0 to 1"), "{range}");
         let version = message("version=9");

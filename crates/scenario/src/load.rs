@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use toml::{Table, Value};
-use whole_file::one_line;
+use whole_file::{one_line, plain};
 
 use crate::layers::{LayerKind, Layers};
 use crate::{Error, Scenario, VERSION};
@@ -18,7 +18,7 @@ pub struct Selection {
     pub domain: String,
     /// Robot: `sawyer`, `jaco`, or a path.
     pub robot: String,
-    /// Preset: `paper`, or a path.
+    /// Preset: `surmise`, `paper`, or a path.
     pub preset: String,
     /// A run of a minute or two.
     pub quick: bool,
@@ -76,6 +76,8 @@ impl Selection {
     }
 }
 
+/// Preset of programs that play, where none is asked for: the best that we build.
+pub const PRESET: &str = "surmise";
 /// Size of a file.
 const MOST_BYTES: u64 = 4 << 20;
 /// Characters of a file that a message quotes.
@@ -140,7 +142,7 @@ fn read(path: &Path) -> Result<Table, Error> {
 /// What a TOML parser says, with the line: its own display quotes the text over several lines.
 fn toml_problem(text: &str, error: &toml::de::Error) -> String {
     let line = whole_file::line_of(text, error.span().map_or(0, |span| span.start));
-    format!("line {line}: {}", error.message())
+    format!("line {line}: {}", plain(error.message()))
 }
 
 /// What a model that `diagnose` wrote says to a scenario: the effects. The rest is about the object of its log.
@@ -304,7 +306,7 @@ mod tests {
             (b"a = \x07", "line 1"),
             (b"\n\na = [", "line 3"),
             (b"\xff", "UTF-8"),
-            (long.as_bytes(), "unknown field"),
+            (long.as_bytes(), "there is no key"),
             (b"name = \"../D4\"", "name: expected 1 to 64 letters"),
         ];
         for (bytes, expected) in cases {

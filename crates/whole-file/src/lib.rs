@@ -12,7 +12,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod next;
 mod owner;
+mod plain;
 mod terminal;
 
 use std::cell::Cell;
@@ -21,7 +23,9 @@ use std::panic::{UnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-pub use owner::check_owner;
+pub use next::{next, typed};
+pub use owner::{Owner, check_owner};
+pub use plain::plain;
 pub use terminal::{complain, interrupted, print, say, show};
 
 /// What to do with a file that is already there.
@@ -61,7 +65,7 @@ impl Error {
 /// then.
 pub fn write(path: &Path, bytes: &[u8], existing: Existing) -> Result<bool, Error> {
     if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
-        return Err(Error::at("replace", path)(io::Error::other("it is no plain file")));
+        return Err(Error::at("replace", path)(io::Error::other("it is not a plain file")));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let prefix = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
@@ -94,12 +98,12 @@ pub fn write(path: &Path, bytes: &[u8], existing: Existing) -> Result<bool, Erro
 ///
 /// # Errors
 ///
-/// [`Error`] where it is no plain file or larger, and where the operating system refuses.
+/// [`Error`] where it is not a plain file, or is larger, and where the operating system refuses.
 pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>, Error> {
     let at = |kind, text: String| Error::at("read", path)(io::Error::new(kind, text));
     let about = std::fs::metadata(path).map_err(Error::at("read", path))?;
     if !about.is_file() {
-        return Err(at(io::ErrorKind::InvalidInput, "it is no plain file".into()));
+        return Err(at(io::ErrorKind::InvalidInput, "it is not a plain file".into()));
     }
     let too_large =
         |found| at(io::ErrorKind::FileTooLarge, format!("expected at most {most_bytes} bytes, found {found}"));
@@ -216,10 +220,10 @@ mod tests {
         assert_eq!(read(&path, 5).unwrap(), b"12345");
         let error = read(&path, 4).unwrap_err();
         assert_eq!(error.source.to_string(), "expected at most 4 bytes, found 5");
-        assert_eq!(read(folder.path(), 4).unwrap_err().source.to_string(), "it is no plain file");
+        assert_eq!(read(folder.path(), 4).unwrap_err().source.to_string(), "it is not a plain file");
         assert_eq!(read(&folder.path().join("b"), 4).unwrap_err().source.kind(), io::ErrorKind::NotFound);
         #[cfg(unix)]
-        assert_eq!(read(Path::new("/dev/zero"), 4).unwrap_err().source.to_string(), "it is no plain file");
+        assert_eq!(read(Path::new("/dev/zero"), 4).unwrap_err().source.to_string(), "it is not a plain file");
     }
 
     #[test]

@@ -228,7 +228,7 @@ impl Answer {
 }
 
 fn problem_of(error: &serde_json::Error) -> String {
-    let text = error.to_string();
+    let text = whole_file::plain(&error.to_string());
     // What people meet: JSON knows neither, but some languages write them.
     let hint = if text.starts_with("expected value") { " (JSON has neither NaN nor Infinity)" } else { "" };
     format!("{text}{hint}")

@@ -45,8 +45,9 @@ impl Suite {
             let text = std::fs::read_to_string(folder.join(format!("{name}.json"))).unwrap_or_default();
             match serde_json::from_str::<Combined>(&text) {
                 Ok(combined) => tables.push((name.to_owned(), combined, Vec::new())),
-                Err(source) if is_some_table(&text) => {
-                    return Err(Error::Table { path: folder.join(format!("{name}.json")), source });
+                Err(error) if is_some_table(&text) => {
+                    let reason = whole_file::plain(&error.to_string());
+                    return Err(Error::Table { path: folder.join(format!("{name}.json")), reason });
                 }
                 Err(_) => {}
             }

@@ -70,5 +70,5 @@ fn a_table_of_another_version_is_named() {
     assert!(Suite::read(folder.path()).unwrap().is_empty(), "no table");
     std::fs::write(folder.path().join("old.json"), "{\"rows\": [], \"comparisons\": [], \"provenance\": {}}").unwrap();
     let error = Suite::read(folder.path()).unwrap_err().to_string();
-    assert!(error.contains("old.json") && error.contains("missing field"), "{error}");
+    assert!(error.contains("old.json") && error.contains("is missing"), "{error}");
 }
