@@ -74,7 +74,7 @@ fn priors_that_do_not_fit_are_refused() {
     let out = folder.path().join("out");
     let eval = |robot: &str, prior: &Path| {
         let (prior, out) = (prior.display(), out.display());
-        format!("--domain D4 --robot {robot} --quick --methods rnn-max --prior {prior} --out {out}")
+        format!("--domain D4 --preset paper --robot {robot} --quick --methods rnn-max --prior {prior} --out {out}")
     };
     let trained = &trained().prior;
     refused("eval", &eval("jaco", trained), &["prior.json", "sawyer", "jaco"]);
@@ -134,7 +134,7 @@ fn a_run_folder_of_another_run_is_refused_and_left_alone() {
     for (binary, arguments) in others {
         refused(binary, &format!("{arguments} --out {out}"), &["holds an evaluation (run.json)", "choose another"]);
     }
-    refused("report", &format!("{out} --out {out}/trials.jsonl"), &["trials.jsonl", "no page of ours"]);
+    refused("report", &format!("{out} --out {out}/trials.jsonl"), &["trials.jsonl", "not a page of this program"]);
     assert!(files(folder.path()) == before);
     // A page is replaced by a newer one.
     for _ in 0..2 {

@@ -9,7 +9,7 @@ use end_to_end::{files, program, run, skipped, stderr};
 use tempfile::TempDir;
 
 const DATA: &str = "--transitions 48000 --shards 12";
-const TRIALS: &str = "--domain D4 --quick --trials 8 --shards 6 --methods heuristic,no-rnn --set task.horizon=20 \
+const TRIALS: &str = "--domain D4 --preset paper --quick --trials 8 --shards 6 --methods heuristic,no-rnn --set task.horizon=20 \
                       --set planner.budget={transitions=200} --set belief.rejection.particles=30 \
                       --set belief.rejection.max_attempts=90";
 

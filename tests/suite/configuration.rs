@@ -53,7 +53,7 @@ fn the_table_is_aligned_and_can_be_cut_to_a_part() {
     }
     assert!(all.lines().count() > 150);
     assert!(
-        all.ends_with("keys\n") && all.contains("D4 for sawyer with preset paper is good"),
+        all.ends_with("keys\n") && all.contains("D4 for sawyer with preset surmise is good"),
         "{}",
         stdout("check D4 --only name")
     );

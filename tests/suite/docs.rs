@@ -92,21 +92,103 @@ fn every_option_in_the_documents_exists() {
     assert!(checked > 50, "{checked} options");
 }
 
-/// The help of a verb, and of its own verbs.
-fn help(verb: &str) -> String {
-    let own: &[&str] = match verb {
+/// Verbs that a verb has of its own.
+fn verbs_of(verb: &str) -> &'static [&'static str] {
+    match verb {
         "bench" => &["physics", "belief", "planner", "prior", "accuracy"],
         "import-log" => &["contactnets", "cmu-push"],
         "scenario" => &["check", "schema"],
         _ => &[],
-    };
-    let mut text = String::new();
-    for own in std::iter::once(None).chain(own.iter().map(Some)) {
-        let output = tool(verb).args(own).arg("--help").output().unwrap();
-        assert!(output.status.success(), "{verb}: {}", stderr(&output));
-        text += &String::from_utf8_lossy(&output.stdout);
     }
-    text
+}
+
+/// The help of a verb, and of its own verbs.
+fn help(verb: &str) -> String {
+    let own = verbs_of(verb);
+    std::iter::once(None).chain(own.iter().copied().map(Some)).map(|own| one_help(verb, own)).collect()
+}
+
+fn one_help(verb: &str, own: Option<&str>) -> String {
+    let output = tool(verb).args(own).arg("--help").output().unwrap();
+    assert!(output.status.success(), "{verb}: {}", stderr(&output));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// What the menu lists, without what this machine need not have.
+const VERBS: [&str; 14] = [
+    "doctor",
+    "eval",
+    "demo",
+    "report",
+    "scenario",
+    "import-log",
+    "record-log",
+    "diagnose",
+    "datagen",
+    "train",
+    "calibrate",
+    "bench",
+    "diagnose-benchmark",
+    "completions",
+];
+
+/// Commands under the last heading of a help.
+fn examples(help: &str) -> Vec<String> {
+    let (_, examples) = help.rsplit_once("\nExamples:\n").unwrap_or_default();
+    let commands = examples.lines().filter_map(|line| line.trim().strip_prefix("cargo xtask "));
+    commands.map(|command| command.split("  ").next().unwrap_or(command).to_owned()).collect()
+}
+
+#[test]
+fn the_menu_lists_every_verb_and_the_versions_are_said() {
+    let menu = end_to_end::run("xtask", "");
+    let text = String::from_utf8_lossy(&menu.stdout).into_owned();
+    assert!(menu.status.success() && menu.stderr.is_empty(), "{menu:?}");
+    for verb in VERBS.iter().chain(&NOT_HERE) {
+        assert!(text.contains(&format!("\n  {verb:<18}  ")), "{verb} in {text}");
+    }
+    assert_eq!(text, String::from_utf8_lossy(&end_to_end::run("xtask", "--help").stdout));
+    for verb in VERBS.iter().filter(|verb| !["doctor", "completions"].contains(verb)) {
+        let output = end_to_end::run("xtask", &format!("{verb} --version"));
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert_eq!(said, format!("{verb} {}\n", env!("CARGO_PKG_VERSION")), "{output:?}");
+    }
+}
+
+#[test]
+fn every_help_ends_with_examples_whose_options_exist() {
+    for verb in VERBS {
+        for own in std::iter::once(None).chain(verbs_of(verb).iter().copied().map(Some)) {
+            let help = one_help(verb, own);
+            let examples = examples(&help);
+            assert!(!examples.is_empty(), "{verb} {own:?}: no example in {help}");
+            let name = [Some(verb), own].into_iter().flatten().collect::<Vec<_>>().join(" ");
+            assert!(examples.iter().any(|command| command.starts_with(&name)), "{name}: {examples:?}");
+            for command in examples {
+                let words = words(&command);
+                let inner = words.get(1).map(String::as_str).filter(|word| verbs_of(&words[0]).contains(word));
+                let text = one_help(&words[0], inner);
+                let known: BTreeSet<&str> = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '-').collect();
+                for option in words.iter().filter(|word| word.starts_with("--")) {
+                    assert!(known.contains(option.as_str()), "{name}: {command} has no {option}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn examples_that_take_seconds_work() {
+    let verbs = ["doctor", "completions", "scenario", "eval", "demo", "report", "record-log", "diagnose"];
+    let mut commands = Vec::new();
+    for verb in verbs {
+        for own in std::iter::once(None).chain(verbs_of(verb).iter().copied().map(Some)) {
+            commands.extend(examples(&one_help(verb, own)));
+        }
+    }
+    commands.dedup();
+    // Tables take minutes; a doctor may find something missing.
+    play_commands("examples", commands, &["doctor"], &["--all"]);
 }
 
 /// The program behind a verb.
@@ -144,9 +226,13 @@ fn play(document: &str) {
 /// Plays commands in order, so that one finds what those above it left, but for some verbs and for what has `lacking` in it. The folder that it
 /// happened in.
 pub(crate) fn play_with(document: &str, but: &[&str], lacking: &[&str]) -> tempfile::TempDir {
+    play_commands(document, commands(&root().join(document)), but, lacking)
+}
+
+fn play_commands(document: &str, commands: Vec<String>, but: &[&str], lacking: &[&str]) -> tempfile::TempDir {
     let project = copy_of_the_project();
     let mut played = 0;
-    for command in commands(&root().join(document)) {
+    for command in commands {
         let all = words(&command);
         let (verb, rest) = (all[0].as_str(), &all[1..]);
         let left_out = but.contains(&verb) || NOT_HERE.contains(&verb);

@@ -130,7 +130,7 @@ fn train_survives_kills() {
 
 #[test]
 fn eval_survives_kills() {
-    let search = "--domain D4 --quick --trials 3 --threads 1 --set planner.budget={transitions=120} --set belief.rejection.particles=30 \
+    let search = "--domain D4 --preset paper --quick --trials 3 --threads 1 --set planner.budget={transitions=120} --set belief.rejection.particles=30 \
                   --set belief.rejection.max_attempts=90";
     let arguments = format!("{search} --prior {}", trained().prior.display());
     Work { binary: "eval", arguments, kept: trials }.survives();
@@ -148,7 +148,21 @@ fn two_evaluations_in_one_folder_refuse_each_other() {
     let out = folder.path().join("run");
     let start = || {
         let mut command = program("eval");
-        command.args(["--domain", "D4", "--methods", "no-rnn", "--trials", "2", "--threads", "1", "--out"]).arg(&out);
+        command
+            .args([
+                "--domain",
+                "D4",
+                "--preset",
+                "paper",
+                "--methods",
+                "no-rnn",
+                "--trials",
+                "2",
+                "--threads",
+                "1",
+                "--out",
+            ])
+            .arg(&out);
         command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
     };
     // Both at once: whichever comes second is refused while the other one plays on, for seconds.

@@ -9,7 +9,7 @@ use crate::pipeline::trained;
 
 /// Programs that write into `--out`, with what they work on for some seconds.
 fn writers() -> Vec<(&'static str, String)> {
-    let search = "--domain D4 --quick --trials 2 --threads 2 --set planner.budget={transitions=120} \
+    let search = "--domain D4 --preset paper --quick --trials 2 --threads 2 --set planner.budget={transitions=120} \
                   --set belief.rejection.particles=30 --set belief.rejection.max_attempts=90 --methods no-rnn,heuristic";
     let log = "--measured tests/data/mujoco-logs/logs/set-003 --threads 2";
     vec![

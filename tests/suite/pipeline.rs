@@ -9,7 +9,7 @@ use end_to_end::{files, program, run, stderr};
 use tempfile::TempDir;
 
 const DATA: &str = "--transitions 2000 --shards 10 --set data.episode_actions=10";
-const SEARCH: &str = "--domain D4 --quick --trials 2 --set planner.budget={transitions=120} --set belief.rejection.particles=30 \
+const SEARCH: &str = "--domain D4 --preset paper --quick --trials 2 --set planner.budget={transitions=120} --set belief.rejection.particles=30 \
                       --set belief.rejection.max_attempts=90";
 
 /// A small dataset and a prior trained on it for three epochs, made once for all tests.
@@ -192,7 +192,7 @@ fn both_arms_play_an_episode() {
     for (domain, robot) in [("D5", "sawyer"), ("obstacle", "jaco"), ("D4", "jaco")] {
         let out = folder.path().join(format!("{domain}-{robot}"));
         let arguments = format!(
-            "--domain {domain} --robot {robot} --quick --trials 1 --methods no-rnn,oracle,heuristic \
+            "--domain {domain} --robot {robot} --preset paper --quick --trials 1 --methods no-rnn,oracle,heuristic \
              --set planner.budget={{transitions=120}} --set belief.rejection.max_attempts=90 --out {}",
             out.display()
         );

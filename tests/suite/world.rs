@@ -7,7 +7,7 @@ use std::time::Duration;
 use end_to_end::{files, program, skipped, stderr};
 use serde_json::Value;
 
-const TASK: &str = "--domain obstacle --robot jaco --quick --set task.horizon=20 --set planner.budget={transitions=100} --set belief.rejection.particles=30 \
+const TASK: &str = "--domain obstacle --robot jaco --preset paper --quick --set task.horizon=20 --set planner.budget={transitions=100} --set belief.rejection.particles=30 \
                     --set belief.rejection.max_attempts=90";
 const EXAMPLE: &str = "python3 assets/worlds/example_world.py";
 

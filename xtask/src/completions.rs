@@ -39,7 +39,10 @@ Install:
 In bash and zsh this completes `cargo xtask`; in every shell it completes a command `xtask`, so that
   alias xtask='cargo xtask'
 is completed too. Options of the programs are taken from those that are built: once any command has run
-(it builds all), write the script again.";
+(it builds all), write the script again.
+
+Examples:
+  cargo xtask completions bash";
 
 /// `cargo xtask` in bash: the words behind `cargo` are those of `xtask`, everything else is left to what completes cargo.
 const BASH: &str = r#"

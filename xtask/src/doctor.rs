@@ -13,7 +13,8 @@ use serde_json::json;
 
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Exit codes: 0 everything that is required is there, 1 something required is missing or broken."
+    after_help = "Exit codes: 0 everything that is required is there, 1 something required is missing or broken.\n\n\
+                  Examples:\n  cargo xtask doctor\n  cargo xtask doctor --json"
 )]
 pub(crate) struct Options {
     /// Python whose modules are looked at.
@@ -86,6 +87,10 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
     checks.extend(tools::optional(&root, &options.python));
     let good = checks.iter().all(|check| check.state == State::Ok || !check.required);
     whole_file::show(&if options.json { as_json(&checks, good) } else { as_text(&checks) });
+    if good && !options.json {
+        let demo = ["cargo", "xtask", "demo"].map(String::from).to_vec();
+        whole_file::next(&[(demo, "builds what it needs, in minutes, and plays one episode")]);
+    }
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 

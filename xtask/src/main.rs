@@ -3,19 +3,20 @@
 mod ci;
 mod completions;
 mod doctor;
+mod groups;
 mod program;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{FromArgMatches as _, Parser, Subcommand};
 use program::{become_program, become_viewer};
 
-/// Commands of the project. `cargo xtask VERB --help` lists the options of a verb.
+/// Commands of the project.
 #[derive(Debug, Parser)]
 #[command(name = "cargo xtask", version)]
 struct Menu {
     #[command(subcommand)]
-    verb: Verb,
+    verb: Option<Verb>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -38,7 +39,7 @@ enum Verb {
     /// Makes a page of a run, of all tables, or of an episode.
     #[command(disable_help_flag = true)]
     Report(Rest),
-    /// Makes a recording for the Rerun viewer of an episode of demo. The first time it compiles the viewer's library, for a quarter of an hour.
+    /// Makes a recording of an episode for the Rerun viewer; its first build takes a quarter of an hour.
     #[command(disable_help_flag = true)]
     Rerun(Rest),
     /// Turns published measurements into a log that can be diagnosed.
@@ -47,16 +48,16 @@ enum Verb {
     /// Records a log in the true world of a scenario, to rehearse a diagnosis.
     #[command(disable_help_flag = true)]
     RecordLog(Rest),
-    /// Finds where a log and the simulation disagree and names the missing effect.
+    /// Finds where a measured log and the simulation disagree, and names the missing effect.
     #[command(disable_help_flag = true)]
     Diagnose(Rest),
-    /// Has diagnose explain generated logs whose hidden effect it cannot know, and scores its answers.
+    /// Scores diagnose on generated logs whose hidden effect it cannot know.
     #[command(disable_help_flag = true)]
     DiagnoseBenchmark(Rest),
-    /// Times the parts and checks their accuracy, beside peers where those are installed.
+    /// Measures time and accuracy, beside other programs where those are installed.
     #[command(disable_help_flag = true)]
     Bench(Rest),
-    /// Explains every key of a scenario, and describes the files to editors.
+    /// Explains and checks every key of a scenario; prints the format's schema for editors.
     #[command(disable_help_flag = true)]
     Scenario(Rest),
     /// Checks that this machine has what the project needs, before anything is built.
@@ -64,6 +65,7 @@ enum Verb {
     /// Prints a script that completes these commands in a shell.
     Completions(completions::Options),
     /// Runs exactly what CI runs: formatting, lints, all tests.
+    #[command(after_help = "Examples:\n  cargo xtask ci")]
     Ci,
 }
 
@@ -75,7 +77,14 @@ struct Rest {
 }
 
 fn main() -> ExitCode {
-    let result = match Menu::parse().verb {
+    let mut menu = groups::menu();
+    let chosen = Menu::from_arg_matches(&menu.get_matches_mut()).unwrap_or_else(|error| error.exit());
+    let Some(verb) = chosen.verb else {
+        // Who asks for nothing wants to see what there is.
+        whole_file::show(&menu.render_help().to_string());
+        return ExitCode::SUCCESS;
+    };
+    let result = match verb {
         Verb::Datagen(rest) => become_program("datagen", &rest.arguments),
         Verb::Train(rest) => become_program("train", &rest.arguments),
         Verb::Calibrate(rest) => become_program("calibrate", &rest.arguments),

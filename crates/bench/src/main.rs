@@ -12,7 +12,7 @@ use serde_json::Value;
 
 /// Benchmarks: time and accuracy, beside peers where those are installed.
 #[derive(Debug, Parser)]
-#[command(name = "bench", version)]
+#[command(name = "bench", version, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -24,6 +24,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum What {
     /// Time of one action, in turn with MuJoCo and PyBullet (Python of the variable PYTHON, else python3).
+    #[command(after_help = "Examples:\n  cargo xtask bench physics --rounds 3")]
     Physics {
         /// Batches of every program; medians of these are compared.
         #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -36,6 +37,7 @@ enum What {
         json: bool,
     },
     /// The filters of the presets on the pushing task: depletion, effective size, errors of the estimated parameters.
+    #[command(after_help = "Examples:\n  cargo xtask bench belief --episodes 4 --quick")]
     Belief {
         /// Domain: D1 to D5, or a scenario file.
         #[arg(long, default_value = "D4")]
@@ -54,6 +56,7 @@ enum What {
         set: Vec<String>,
     },
     /// Speed, returns and exact values of the search on the standard problems.
+    #[command(after_help = "Examples:\n  cargo xtask bench planner --quick")]
     Planner {
         /// Episodes with 2^10 simulations a move; half as many with 2^13, a quarter with 2^15.
         #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=100_000))]
@@ -66,6 +69,7 @@ enum What {
         json: bool,
     },
     /// Training and inference of the prior, in turn with PyTorch (Python of the variable PYTHON, else python3).
+    #[command(after_help = "Examples:\n  cargo xtask bench prior --rounds 3")]
     Prior {
         /// Epochs of every program; medians of these are compared.
         #[arg(long, default_value_t = 7, value_parser = clap::value_parser!(u32).range(1..=1000))]
@@ -84,6 +88,7 @@ enum What {
         json: bool,
     },
     /// Errors against MuJoCo's recorded answers and closed forms: the page in the docs of physics-model.
+    #[command(after_help = "Examples:\n  cargo xtask bench accuracy")]
     Accuracy {
         /// Writes the page into the project.
         #[arg(long)]
@@ -93,6 +98,11 @@ enum What {
         set: Vec<String>,
     },
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask bench planner --quick
+  cargo xtask bench accuracy";
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {

@@ -14,10 +14,11 @@ use dataset::{Plan, ShardInfo, ShardState};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
 use scenario::Selection;
+use whole_file::typed;
 
 /// Generates training data: randomised worlds, heuristic policy, recorded transitions.
 #[derive(Debug, Parser)]
-#[command(name = "datagen", version)]
+#[command(name = "datagen", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Arm: sawyer or jaco.
     #[arg(long, default_value = "sawyer")]
@@ -28,13 +29,13 @@ struct Arguments {
     /// Root seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Shards to cut the dataset into.
+    /// Number of shards of the dataset.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     shards: u32,
     /// Who makes the shards: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
-    /// Makes this shard alone, as the tasks of an array do; the dataset is finished by the command without it.
+    /// Makes only this shard, as the tasks of an array do. The command without --worker finishes the dataset.
     #[arg(long, value_name = "SHARD")]
     worker: Option<u32>,
     /// Worker threads of the local executor [default: all cores].
@@ -59,6 +60,11 @@ struct Arguments {
     #[arg(long)]
     json: bool,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask datagen --quick
+  cargo xtask datagen --robot jaco --transitions 4000 --shards 4 --out runs/data/jaco-small";
 
 /// What went wrong after the input was found to be good.
 #[derive(Debug)]
@@ -123,7 +129,18 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     let manifest = job.finish().context(Failed)?;
     job.print(&manifest, &missing, started.elapsed().as_secs_f64(), arguments.json);
+    if !arguments.json {
+        suggest_train(&job, arguments.quick);
+    }
     Ok(true)
+}
+
+/// What to do with a finished dataset.
+fn suggest_train(job: &Job, quick: bool) {
+    let mut train: Vec<String> =
+        ["cargo", "xtask", "train", "--robot", &job.robot, "--data", &typed(&job.out)].map(String::from).to_vec();
+    train.extend(quick.then(|| "--quick".into()));
+    whole_file::next(&[(train, "trains the prior on it")]);
 }
 
 /// A dataset to be made.

@@ -52,10 +52,14 @@ impl Folder {
     ///
     /// A folder of other options, or one that another process holds.
     pub fn open(root: &Path, identity: &Identity, any_solver: bool) -> Result<Self> {
-        for part in ["logs", "answers", "truth", "reference"] {
-            let path = root.join(part);
-            std::fs::create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;
+        let parts = ["logs", "answers", "truth", "reference"];
+        // What is half made there is made anew: it must not be somebody else's.
+        if !root.join("plan.json").exists()
+            && let Some(part) = parts.iter().find(|part| root.join(part).exists())
+        {
+            bail!("{}: holds {part} without plan.json: give another --out", root.display());
         }
+        std::fs::create_dir_all(root).with_context(|| format!("cannot create {}", root.display()))?;
         let lock = File::create(root.join(".lock")).context("cannot hold the folder")?;
         match lock.try_lock() {
             Ok(()) => {}
@@ -75,6 +79,10 @@ impl Folder {
             }
         } else {
             save(&path, identity)?;
+        }
+        for part in parts {
+            let path = root.join(part);
+            std::fs::create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;
         }
         Ok(Self { root: root.to_path_buf(), _lock: lock })
     }
@@ -176,7 +184,9 @@ impl Folder {
         let output = output.with_context(|| format!("cannot run {}", diagnose.display()))?;
         if !output.status.success() {
             let said = String::from_utf8_lossy(&output.stderr);
-            bail!("{}: diagnose ended with {}: {}", name(set), output.status, said.trim());
+            // What it says last is why; before it stands how far it was.
+            let last = said.trim().lines().last().unwrap_or_default();
+            bail!("{}: diagnose ended with {}: {last}", name(set), output.status);
         }
         Ok(())
     }
@@ -195,7 +205,8 @@ pub fn name(set: usize) -> String {
 /// A file that is not there or says something else.
 pub fn read<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    serde_json::from_str(&text).with_context(|| format!("{}", path.display()))
+    serde_json::from_str(&text)
+        .map_err(|error| anyhow::anyhow!("{}: {}", path.display(), whole_file::plain(&error.to_string())))
 }
 
 /// Writes JSON whole.

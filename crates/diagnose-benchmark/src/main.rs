@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use anyhow::{Context as _, Result};
@@ -20,21 +20,21 @@ use whole_file::Existing;
 
 /// Generates logs with a hidden effect, has diagnose explain them, and scores its answers.
 #[derive(Debug, Parser)]
-#[command(name = "diagnose-benchmark", version)]
+#[command(name = "diagnose-benchmark", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Sets with an effect of the catalogue, of each kind of actions.
+    /// Number of sets with an effect of the catalogue, for each kind of actions.
     #[arg(long, default_value_t = 204)]
     sets: u32,
-    /// Sets without an effect, of each kind of actions.
+    /// Number of sets without an effect, for each kind of actions.
     #[arg(long, default_value_t = 100)]
     none: u32,
-    /// Sets with an effect outside the catalogue, of each kind of actions.
+    /// Number of sets with an effect outside the catalogue, for each kind of actions.
     #[arg(long, default_value_t = 40)]
     unknown: u32,
-    /// Sets with two effects, of each kind of actions.
+    /// Number of sets with two effects, for each kind of actions.
     #[arg(long, default_value_t = 40)]
     pairs: u32,
-    /// Sets of an arm, one in three of them without an effect.
+    /// Number of sets of an arm; one in three has no effect.
     #[arg(long, default_value_t = 12)]
     arms: u32,
     /// Kinds of actions.
@@ -49,22 +49,27 @@ struct Arguments {
     /// Folder of the benchmark.
     #[arg(long, default_value = "runs/diagnose-benchmark")]
     out: PathBuf,
-    /// Sets at a time [default: all cores]; logs and answers do not depend on it.
+    /// Number of sets at a time [default: all cores]; logs and answers do not depend on it.
     #[arg(long)]
     threads: Option<usize>,
-    /// Scores what is answered, and answers nothing.
+    /// Only scores the answers that are there.
     #[arg(long)]
     score_only: bool,
-    /// Adds what simple programs reach.
+    /// Adds baselines: what simpler programs reach on the same sets.
     #[arg(long)]
     baselines: bool,
-    /// The solver [default: diagnose beside this program].
+    /// Program that answers [default: diagnose, beside this program].
     #[arg(long)]
     diagnose: Option<PathBuf>,
     /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
     #[arg(long)]
     root: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask diagnose-benchmark --sets 4 --none 2 --unknown 2 --pairs 0 --arms 0 --out runs/diagnose-benchmark/small
+  cargo xtask diagnose-benchmark --sets 4 --none 2 --unknown 2 --pairs 0 --arms 0 --out runs/diagnose-benchmark/small --score-only";
 
 /// What went wrong after the input was found to be good.
 #[derive(Debug)]
@@ -75,6 +80,9 @@ impl std::fmt::Display for Failed {
         f.write_str("the benchmark stopped, finished sets are kept")
     }
 }
+
+/// Scores between two lines that say how many there are.
+const SCORES_A_LINE: usize = 50;
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -123,7 +131,17 @@ fn run(arguments: &Arguments) -> Result<bool> {
     if !arguments.score_only && !answer(&folder, &plan, &diagnose, arms, &pool, &interrupted)? {
         return Ok(false);
     }
-    let one = |set| score(&folder, set, arms, arguments.baselines);
+    let scored = AtomicUsize::new(0);
+    whole_file::say!("scoring {} sets", plan.len());
+    let one = |set| {
+        let result = score(&folder, set, arms, arguments.baselines);
+        let done = 1 + scored.fetch_add(1, Ordering::Relaxed);
+        // With the baselines it takes a while, too.
+        if done.is_multiple_of(SCORES_A_LINE) {
+            whole_file::say!("{done} of {} sets are scored", plan.len());
+        }
+        result
+    };
     let results: Vec<Result<Option<Score>>> =
         pool.install(|| (0..plan.len()).into_par_iter().with_max_len(1).map(one).collect());
     let scores: Vec<Score> =
@@ -131,7 +149,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let table = Table::new(&scores, plan.len() - scores.len(), arguments.baselines);
     write(&folder, &table, &scores).context(Failed)?;
     whole_file::show(&format!("{}\n{}", table.to_markdown(), table.confusion_to_markdown()));
-    whole_file::say!("written to {}", arguments.out.display());
+    whole_file::say!("written to {}: table.md, confusion.md, sets.csv", whole_file::typed(&arguments.out));
     Ok(true)
 }
 
@@ -159,6 +177,9 @@ fn answer(
         }
         let done = folder.generate(plan, *set, arms).and_then(|()| folder.solve(diagnose, *set, arms));
         bar.inc(1);
+        if bar.is_hidden() && done.is_ok() {
+            whole_file::say!("{}: answered, {} of {}", name(*set), bar.position(), missing.len());
+        }
         if let Err(error) = done {
             // An interrupt ends the solvers too.
             if interrupted.load(Ordering::Relaxed) {

@@ -17,6 +17,7 @@ use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Nominal, Tunable};
 use crate::plausible;
+use crate::progress::Progress;
 use crate::replay::worst;
 use crate::report::Verdict;
 use crate::rival::Round;
@@ -200,7 +201,7 @@ impl Diagnosis {
     fn without_effects(&mut self) {
         let tried: Vec<&str> = self.model.model.parts.iter().map(|part| part.kind().name()).collect();
         self.reason =
-            self.reason.take().map(|reason| format!("{reason} (the best that was tried: {})", tried.join(", ")));
+            self.reason.take().map(|reason| format!("{reason} (the best effect that was tried: {})", tried.join(", ")));
         self.model = self.nominal.clone();
         self.heldout[1] = self.heldout[0].clone();
         self.heldout_episodes.iter_mut().for_each(|(_, before, after)| *after = *before);
@@ -215,18 +216,35 @@ impl Diagnosis {
 ///
 /// [`Error::Unfit`] for a log without poses of the object, with too few episodes that can be simulated, or of an arm that nothing says the way of.
 pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -> Result<Diagnosis, Error> {
+    diagnose_watched(log, name, nominal, settings, &())
+}
+
+/// The same before the eyes of somebody who waits, which changes nothing.
+///
+/// # Errors
+///
+/// As [`diagnose`].
+pub fn diagnose_watched(
+    log: &Log,
+    name: &str,
+    nominal: &Nominal,
+    settings: &Settings,
+    progress: &dyn Progress,
+) -> Result<Diagnosis, Error> {
     let log = &*driven(log, name, nominal)?;
     let noise = NoiseLevels::of_log(log);
     plausible::check(log, name, nominal, &noise, LEAST_FITTED)?;
     let Compared { trials, sides: [fitted, heldout], left_out } = trials(log, name, nominal, &noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
-    let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]);
+    let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]).watched_by(progress);
+    simulator.stage("re-tuning the nominal model");
     let engine = nominal.engine();
     // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search to all episodes, with care
     // where nothing explains much more.
     let study = Study::new(&simulator, engine, fitted);
     let (null, part, places) = null_model(&study);
+    simulator.stage("screening the effects");
     let context = context(&study, &null, log, &noise);
     let screening = Screening::new(&part, places, &null, &candidates(&context));
     let kept = Study::new(&simulator, engine, heldout);
@@ -237,21 +255,16 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
         heldout: search.kept.groups(),
         counts: search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect(),
     };
+    simulator.stage("fitting effects");
     let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
+    simulator.stage("comparing held-out episodes, before and after");
     let null = rounds[0].base.clone();
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
     if !heldout.iter().flatten().all(|sum| sum.is_finite()) {
         let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
         return Err(Error::Unfit { log: name.into(), reason });
     }
-    // Of each episode, whose pieces come one after another.
-    let heldout_episodes = (episodes.heldout.iter())
-        .map(|group| {
-            let count = episodes.counts[group.clone()].iter().sum::<usize>().max(1) as f64;
-            let [before, after] = [0, 1].map(|i| heldout[i][group.clone()].iter().sum::<f64>() / count);
-            (trials[search.kept.chosen[group.start]].id, before, after)
-        })
-        .collect::<Vec<_>>();
+    let heldout_episodes = by_episode(&heldout, &episodes, |place| trials[search.kept.chosen[place]].id);
     let fitted_mean = |group: &Range<usize>| mean_square(&accepted.residuals[group.clone()]);
     let mean_squares =
         episodes.fitted.iter().map(fitted_mean).chain(heldout_episodes.iter().map(|(_, _, after)| *after)).collect();
@@ -287,6 +300,16 @@ pub fn diagnose(log: &Log, name: &str, nominal: &Nominal, settings: &Settings) -
     diagnosis.judge(&search.study, settings);
     diagnosis.rollouts = simulator.rollouts();
     Ok(diagnosis)
+}
+
+/// Of each held-out episode, whose pieces come one after another: number in the log, mean squares before and after. `id` says the number of a piece.
+fn by_episode(heldout: &[Vec<f64>; 2], episodes: &Episodes, id: impl Fn(usize) -> u64) -> Vec<(u64, f64, f64)> {
+    let one = |group: &Range<usize>| {
+        let count = episodes.counts[group.clone()].iter().sum::<usize>().max(1) as f64;
+        let [before, after] = [0, 1].map(|i| heldout[i][group.clone()].iter().sum::<f64>() / count);
+        (id(group.start), before, after)
+    };
+    episodes.heldout.iter().map(one).collect()
 }
 
 /// The null hypothesis, re-tuned, and the episodes of the screening, with errors learnt near it.

@@ -54,6 +54,7 @@ pub mod obstacle;
 mod page;
 mod patch;
 mod plausible;
+mod progress;
 mod replay;
 pub mod report;
 pub mod rival;
@@ -75,11 +76,12 @@ use measured_log::{Axis, Channel, Log, Robot};
 use physics_model::rig::RigTool;
 use scenario::{Problem, Selection, find_root};
 
-pub use diagnosis::{Diagnosis, Settings, diagnose};
+pub use diagnosis::{Diagnosis, Settings, diagnose, diagnose_watched};
 pub use error::Error;
 pub use model_file::ModelFile;
 pub use nominal::Nominal;
 pub use page::page;
+pub use progress::Progress;
 pub use report::{Report, Verdict};
 
 /// What moves by command in a log.

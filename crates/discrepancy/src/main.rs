@@ -6,12 +6,18 @@ use std::time::Instant;
 
 use clap::Parser;
 use discrepancy::interval::decimals;
-use discrepancy::{Error, ModelFile, Nominal, Report, Settings, diagnose, page, rig_tool};
-use whole_file::Existing;
+use discrepancy::{Error, ModelFile, Nominal, Report, Settings, Verdict, diagnose_watched, page, rig_tool};
+use measured_log::Robot;
+use whole_file::{Existing, typed};
+
+#[path = "program/bar.rs"]
+mod bar;
+#[path = "program/folder.rs"]
+mod folder;
 
 /// Finds where simulation and measurement disagree, names the missing effect, adds it to the model and shows the gap shrink.
 #[derive(Debug, Parser)]
-#[command(name = "diagnose", version)]
+#[command(name = "diagnose", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Folder of the log: log.toml with samples.csv or samples.parquet (docs/src/reference/measured-log.md).
     #[arg(long)]
@@ -19,7 +25,8 @@ struct Arguments {
     /// Model to begin with instead of the log's nominal one: the model.toml of an earlier diagnosis.
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Folder for report.json, report.html and model.toml [default: runs/diagnose/NAME of the log's folder].
+    /// Folder for report.json, report.html and model.toml [default: runs/diagnose/NAME of the log's folder; where that holds the answer to another
+    /// log, runs/diagnose/NAME- and a hash].
     #[arg(long)]
     out: Option<PathBuf>,
     /// Seed of the hold-out split and of the bootstrap.
@@ -38,6 +45,11 @@ struct Arguments {
     #[arg(long)]
     root: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask diagnose --measured tests/data/mujoco-logs/logs/set-003 --out runs/diagnose/first
+  cargo xtask diagnose --measured tests/data/mujoco-logs/logs/set-003 --model runs/diagnose/first/model.toml --out runs/diagnose/again";
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -60,13 +72,15 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     let log = measured_log::read(&arguments.measured)?;
     let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
-    let out = arguments.out.clone().unwrap_or_else(|| default_folder(&arguments.measured));
+    let owner = folder::owner(&arguments.measured);
+    let out = arguments.out.clone().unwrap_or_else(|| folder::default(&arguments.measured, &owner, &FILES));
     let begun = match &arguments.model {
         Some(path) => Some(begin_with(path, &out, &mut nominal)?),
         None => None,
     };
     // Before a minute is spent on what could not be written.
-    whole_file::check_owner(&out, "report.json").map_err(|source| Error::Taken { source })?;
+    let free = whole_file::check_owner(&out, "report.json").and_then(|()| owner.check(&out, &FILES));
+    free.map_err(|source| Error::Taken { source })?;
     let made: Vec<PathBuf> = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
     std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
     let clean = || made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
@@ -74,19 +88,22 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
     let name = arguments.measured.display().to_string();
     // A log that says too little leaves nothing behind.
-    let diagnosis = diagnose(&log, &name, &nominal, &settings).inspect_err(|_| clean())?;
+    let watched = diagnose_watched(&log, &name, &nominal, &settings, &bar::Bar::new());
+    let diagnosis = watched.inspect_err(|_| clean())?;
     let mut report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
     report.model = arguments.model.as_ref().map(|path| path.display().to_string());
     let json =
         serde_json::to_string_pretty(&report).map_err(|error| Error::Model { reason: error.to_string() })? + "\n";
     let model = ModelFile::new(&nominal, &diagnosis, &report, begun.as_ref()).to_toml()?;
+    owner.claim(&out)?;
     for (file, text) in FILES.into_iter().zip([&model, &page(&name, &report), &json]) {
         whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
     }
     if arguments.json {
         whole_file::show(&json);
     } else {
-        print_summary(&report, &out);
+        print_summary(&report);
+        suggest_next(arguments, &report, &out, log.header.robot);
     }
     Ok(())
 }
@@ -135,12 +152,7 @@ fn fold(text: &str) -> Result<[usize; 2], String> {
     }
 }
 
-fn default_folder(measured: &Path) -> PathBuf {
-    let name = measured.canonicalize().ok().and_then(|path| path.file_name().map(PathBuf::from));
-    Path::new("runs/diagnose").join(name.unwrap_or_else(|| "log".into()))
-}
-
-fn print_summary(report: &Report, out: &Path) {
+fn print_summary(report: &Report) {
     whole_file::out!("{}", report.summary);
     if let Some(reason) = &report.reason {
         whole_file::out!("  why unknown: {reason}");
@@ -160,9 +172,9 @@ fn print_summary(report: &Report, out: &Path) {
     }
     let names = report.confusion_set.join(", ");
     if report.effects.is_empty() && !names.is_empty() {
-        whole_file::out!("  the evidence leans to, not enough for a name: {names}");
+        whole_file::out!("  the evidence favours {names}, but too little to name it");
     } else if report.confusion_set.len() > 1 {
-        whole_file::out!("  not told apart: {names}");
+        whole_file::out!("  this log does not tell apart: {names}");
     }
     if let Some(description) = &report.description {
         whole_file::out!("  what is left: {description}");
@@ -174,11 +186,41 @@ fn print_summary(report: &Report, out: &Path) {
     if let Some(sentence) = report.left_out_sentence() {
         whole_file::out!("  {sentence}");
     }
-    whole_file::out!("  next: {}", report.next_experiment);
-    whole_file::out!(
-        "{} simulated episodes, {:.0} s; {}",
-        report.rollouts,
-        report.seconds,
-        out.join("report.html").display()
-    );
+    whole_file::out!("  next experiment: {}", report.next_experiment);
+    whole_file::out!("{} simulated episodes, {:.0} s", report.rollouts, report.seconds);
+}
+
+/// What to do with the answer: look at it, ask what is left, plan with it.
+fn suggest_next(arguments: &Arguments, report: &Report, out: &Path, robot: Robot) {
+    whole_file::say!("open {} in a browser: where, what, how sure", typed(&out.join("report.html")));
+    if report.verdict != Verdict::Effect {
+        return;
+    }
+    let command =
+        |words: &[&str]| ["cargo", "xtask"].iter().chain(words).map(ToString::to_string).collect::<Vec<String>>();
+    let (log, model) = (typed(&arguments.measured), typed(&out.join("model.toml")));
+    let name = out.file_name().map_or_else(|| "log".into(), |name| name.to_string_lossy().into_owned());
+    let again = typed(&out.with_file_name(format!("{name}-again")));
+    let mut commands = vec![(
+        command(&["diagnose", "--measured", &log, "--model", &model, "--out", &again]),
+        "shows whether anything is left",
+    )];
+    if let Some((robot, truth)) = simulated_truth(arguments, out, robot) {
+        let mut plan = command(&["eval", "--domain", "D1", "--robot", robot, "--methods", "no-rnn", "--trials", "10"]);
+        plan.extend(["--model".into(), model, "--set".into(), truth]);
+        commands.push((plan, "plans with it, in a simulated world that has it too"));
+    }
+    whole_file::next(&commands);
+}
+
+/// The arm of a log in scenarios, and the override that gives a simulated world the effects of the model that was found; none outside a project.
+fn simulated_truth(arguments: &Arguments, out: &Path, robot: Robot) -> Option<(&'static str, String)> {
+    let robot = if robot == Robot::Jaco { "jaco" } else { "sawyer" };
+    let root = arguments.root.clone().or_else(|| scenario::find_root(Path::new(".")).ok())?;
+    let selection = scenario::Selection {
+        robot: robot.into(),
+        effects: Some(out.join("model.toml")),
+        ..scenario::Selection::new(root)
+    };
+    Some((robot, selection.load().ok()?.truth_with_model()))
 }

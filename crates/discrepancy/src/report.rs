@@ -163,7 +163,7 @@ impl Report {
         let ids: Vec<String> = self.left_out.iter().map(u64::to_string).collect();
         (!ids.is_empty()).then(|| {
             format!(
-                "Left out, without a pose of the object before the tool moves and a row after it: episodes {}",
+                "Episodes left out, because they lack a pose of the object before the tool moves or a row after it: {}",
                 ids.join(", ")
             )
         })
@@ -338,20 +338,20 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
             // What few episodes meet may leave the others as they were, or hit one of them harder.
             let goes = if after < before { "falls" } else { "goes" };
             format!(
-                "The model lacks {names}: with {it} the held-out error {goes} from {before:.2} to {after:.2} (1 is noise)."
+                "The model lacks {names}. With {it} the held-out error {goes} from {before:.2} to {after:.2} (noise alone gives 1)."
             )
         }
         Verdict::None => {
-            format!("Re-tuned, the model lacks nothing that shows: held-out error {before:.2} (1 is noise).")
+            format!("The re-tuned model explains this log: its held-out error is {before:.2} (noise alone gives 1).")
         }
         Verdict::Unknown if effects.is_empty() => {
             format!(
-                "Something is missing that no effect of the catalogue explains: held-out error {before:.2} (1 is noise)."
+                "The model lacks something that no effect of the catalogue explains: its held-out error is {before:.2} (noise alone gives 1)."
             )
         }
         Verdict::Unknown => format!(
-            "Something is missing that no effect of the catalogue explains; {names} {comes} nearest: held-out error {before:.2}, \
-             with {it} {after:.2} (1 is noise)."
+            "The model lacks something that no effect of the catalogue explains. Nearest {comes} {names}: with {it} the held-out error \
+             goes from {before:.2} to {after:.2} (noise alone gives 1)."
         ),
     }
 }
@@ -369,7 +369,7 @@ fn describe(diagnosis: &Diagnosis) -> String {
         .map(|cell| {
             let (channel, phase) = (cell.channel.name(), cell.phase.name());
             format!(
-                "{channel} during {phase} ({:.0} % of what is left, mean square {:.1})",
+                "{channel}, {phase}: {:.0} % of what is left, mean square {:.1}",
                 100.0 * cell.share,
                 cell.mean_square
             )

@@ -29,15 +29,19 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ),
     ("static_friction", "adhesion", "vary how long tool and object rest together, then pull away"),
     ("static_friction", "backlash", "vary how long tool and object rest together, then reverse slowly"),
-    ("anisotropic_friction", "table_tilt", "push in eight directions: tilt has one period a turn, anisotropy two"),
+    ("anisotropic_friction", "table_tilt", "push in eight directions: tilt has one period per turn, anisotropy two"),
     ("friction_patch", "mass_leak", "repeat the same push elsewhere on the table"),
     ("tether", "friction_patch", "begin at different places: a tether grows with distance"),
     (
         "edge_rounding",
         "contact_compliance",
-        "lay the object on a face and on an edge: soft contacts let both sink, round edges the latter alone",
+        "lay the object on a face and on an edge: soft contacts let it sink in both, round edges only on the edge",
     ),
-    ("edge_rounding", "pressure_distribution", "let the object tumble: a smaller sole alone changes nothing there"),
+    (
+        "edge_rounding",
+        "pressure_distribution",
+        "let the object tumble: round edges change how it falls, a smaller sole does not",
+    ),
     ("edge_rounding", "pose_scale", "read the height at rest on a face: only a wrong scale changes it"),
     ("com_offset", "pressure_distribution", "push left and right of the middle, and spin the object"),
     ("actuation_delay", "pose_delay", "look at when the force sets in: a late pose does not shift it"),
@@ -46,13 +50,13 @@ const PAIRS: &[(&str, &str, &str)] = &[
     (
         "pose_rotation",
         "table_tilt",
-        "carry the object at constant speed: a turned frame drifts in proportion to the way",
+        "carry the object at constant speed: in a turned frame it drifts in proportion to the distance",
     ),
     ("force_bias", "wrist_payload", "read the force without contact while the tool accelerates or turns"),
     ("force_bias", "force_drift", "read the force without contact for minutes"),
     ("contact_compliance", "actuation_delay", "push a light and a heavy object"),
     ("restitution", "contact_compliance", "hit at two speeds"),
-    ("arm_compliance", "actuator_gain", "move freely: compliance shows under load alone"),
+    ("arm_compliance", "actuator_gain", "move freely: compliance shows only under load"),
     (
         "force_low_pass",
         "contact_compliance",
@@ -79,7 +83,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "wrist_payload",
         "move freely back and forth at constant speed: friction changes its sign, weight does not",
     ),
-    ("backlash", "actuation_delay", "reverse at two speeds: play takes the same way, a delay the same time"),
+    ("backlash", "actuation_delay", "reverse at two speeds: play takes the same distance, a delay the same time"),
     (
         "rolling_resistance",
         "viscous_damping",
@@ -133,12 +137,13 @@ pub fn next_experiment(
 ) -> String {
     if verdict == Verdict::Unknown && before > FAR {
         return format!(
-            "First check log.toml and the samples: a held-out error of {before:.0} comes of another unit, frame, sign or order of a quaternion sooner than of an effect."
+            "First check log.toml and the samples. A held-out error of {before:.0} comes from a wrong unit, frame, sign or order of a quaternion \
+             more often than from an effect."
         );
     }
     let first = confusion_set.first().filter(|_| named);
     let like = telling.map_or(String::new(), |Telling { episode, ln_odds }| {
-        format!(" Of this log episode {episode} says most of it ({ln_odds:+.1} of ln odds): more like that one.")
+        format!(" In this log episode {episode} tells most ({ln_odds:+.1} in ln odds): record more like it.")
     });
     for (place, other) in confusion_set.iter().enumerate().skip(1) {
         // What tells the first two apart says nothing of the first and a third.
@@ -150,14 +155,14 @@ pub fn next_experiment(
     }
     const DESIGNED: &str = "a designed set (eight directions, four speeds, known added weights)";
     match (verdict, confusion_set) {
-        (Verdict::None, []) => format!("None needed; {DESIGNED} would show smaller effects."),
+        (Verdict::None, []) => format!("None is needed. Smaller effects would show in {DESIGNED}."),
         (Verdict::None, names) => {
-            format!("None needed; {DESIGNED} would show whether there is a weak {}.", names.join(" or "))
+            format!("None is needed. Whether there is a weak {} would show in {DESIGNED}.", names.join(" or "))
         }
         (Verdict::Unknown, _) => contacts
-            .unwrap_or("Repeat the worst episodes with one thing changed at a time: place, direction, speed, added weight, time.")
+            .unwrap_or("Repeat the worst episodes and change one thing at a time: place, direction, speed, added weight, time.")
             .into(),
-        (Verdict::Effect, [_]) => "None needed to name it; more episodes narrow the intervals.".into(),
+        (Verdict::Effect, [_]) => "None is needed for the name. More episodes would narrow the intervals.".into(),
         (Verdict::Effect, names) => format!("{}: {DESIGNED}.{like}", names.join(" or ")),
     }
 }
@@ -174,17 +179,17 @@ mod tests {
                 .starts_with("mass_leak or force_drift: weigh")
         );
         assert!(next_experiment(Verdict::Unknown, true, &pair, 3.0, None, None).contains("weigh"));
-        assert!(next_experiment(Verdict::Unknown, true, &pair, 300.0, None, None).contains("another unit"));
+        assert!(next_experiment(Verdict::Unknown, true, &pair, 300.0, None, None).contains("a wrong unit"));
         let telling = Some(Telling { episode: 7, ln_odds: 2.34 });
         assert!(
-            next_experiment(Verdict::Effect, true, &pair, 3.0, telling, None)
-                .contains("episode 7 says most of it (+2.3 of")
+            next_experiment(Verdict::Effect, true, &pair, 3.0, telling, None).contains("episode 7 tells most (+2.3 in")
         );
         assert!(next_experiment(Verdict::Unknown, false, &pair, 3.0, None, None).starts_with("Repeat"));
         assert!(next_experiment(Verdict::Unknown, false, &pair, 3.0, None, Some("Knock.")).starts_with("Knock"));
         assert!(
-            next_experiment(Verdict::None, false, &pair, 3.0, None, None).ends_with("a weak mass_leak or force_drift.")
+            next_experiment(Verdict::None, false, &pair, 3.0, None, None)
+                .contains("a weak mass_leak or force_drift would show")
         );
-        assert!(next_experiment(Verdict::None, false, &[], 3.0, None, None).ends_with("smaller effects."));
+        assert!(next_experiment(Verdict::None, false, &[], 3.0, None, None).contains("Smaller effects"));
     }
 }

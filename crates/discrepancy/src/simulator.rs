@@ -10,6 +10,7 @@ use physics_model::{BodyState, EffectConfig, EffectKind};
 use rayon::prelude::*;
 
 use crate::nominal::{Engine, Nominal};
+use crate::progress::Progress;
 use crate::trial::{Trial, WHOLE};
 
 /// A bounce is over within a step of a slow push: it needs this many times as many.
@@ -49,19 +50,32 @@ pub struct Simulator<'a> {
     simulated: AtomicUsize,
     /// Simulated episodes after which fits end where they are, and which none of their simulations exceeds.
     budget: [usize; 2],
+    progress: &'a dyn Progress,
 }
 
 impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, simulated: AtomicUsize::new(0), budget: [usize::MAX; 2] }
+        Self { nominal, trials, simulated: AtomicUsize::new(0), budget: [usize::MAX; 2], progress: &() }
     }
 
     /// With a number of simulated episodes after which fits end where they are, and one that they never exceed.
     #[must_use]
     pub fn with_budget(self, budget: [usize; 2]) -> Self {
         Self { budget, ..self }
+    }
+
+    /// Before the eyes of somebody who wants to know how far it is.
+    #[must_use]
+    pub fn watched_by(self, progress: &'a dyn Progress) -> Self {
+        Self { progress, ..self }
+    }
+
+    /// Says what begins.
+    pub(crate) fn stage(&self, stage: &'static str) {
+        self.progress.simulated(self.rollouts(), self.budget[1]);
+        self.progress.stage(stage);
     }
 
     /// Whether the budget is used up.
@@ -104,6 +118,7 @@ impl<'a> Simulator<'a> {
         trial: &Trial,
     ) -> (RigReading, Vec<RigReading>) {
         self.simulated.fetch_add(trial.share, Ordering::Relaxed);
+        self.progress.simulated(self.rollouts(), self.budget[1]);
         let configs = || self.nominal.effects.iter().chain(&hypothesis.effects);
         let bounces = configs().any(|effect| effect.kind() == EffectKind::Restitution) && self.nominal.has_tool();
         let engine = &Engine { refinement: engine.refinement * if bounces { BOUNCE_REFINEMENT } else { 1 }, ..*engine };

@@ -56,20 +56,20 @@ impl LackingForce {
     /// In words.
     pub(crate) fn sentence(&self) -> String {
         let lacks = format!(
-            "the re-tuned nominal model lacks a force on the object, {:.2} N (root mean square beyond noise while it moves)",
+            "the re-tuned nominal model lacks a force on the object of {:.2} N (root mean square beyond noise, while the object moves)",
             (self.root_mean_square_n.powi(2) - self.noise_n.powi(2)).max(0.0).sqrt()
         );
         let differs = if self.between_episodes_share > MOST {
             format!(
-                "; {:.0} % of what is left of it lasts as long as an episode and is another in the next: look for what changes between them (how the object stands, \
-                 the surface, the zero of the force sensor)",
+                "; {:.0} % of what is left of it is constant within an episode and differs between episodes: look for what changes between them (how the object \
+                 stands, the surface, the zero of the force sensor)",
                 100.0 * self.between_episodes_share
             )
         } else {
             String::new()
         };
         if self.terms.is_empty() {
-            return format!("{lacks}, that follows no term that was tried{differs}");
+            return format!("{lacks}; it follows none of the terms that were tried{differs}");
         }
         let terms: Vec<String> =
             self.terms.iter().map(|term| format!("{} ({:.0} %)", term.description, 100.0 * term.share)).collect();

@@ -68,12 +68,12 @@ impl ContactGap {
     pub(crate) fn next_experiment(&self) -> Option<&'static str> {
         Some(match self.told()?.0.alike() {
             Alike::Way => {
-                "Measure tool and object, and touch the object from two opposite sides: a wrong size shows alike on both, a wrong place on one as late as early on the other."
+                "Measure the tool and the object, and touch the object from two opposite sides: with a wrong size both contacts are late or both early, with a wrong place one is late and one early."
             }
-            Alike::Time => "Knock on the object: its poses and the force show by how much their clocks differ.",
+            Alike::Time => "Knock on the object: its poses and the force then show how far their clocks differ.",
             Alike::Both => {
-                "Touch the object from two sides at two speeds: contacts that begin apart by the same way of the tool are a matter of sizes or places, by the \
-                 same time one of clocks."
+                "Touch the object from two sides at two speeds. Contacts that begin apart by the same distance point to sizes or places, by the same time to \
+                 clocks."
             }
         })
     }
@@ -87,15 +87,15 @@ impl ContactGap {
         let readings = 100.0 * part.readings;
         let readings = if readings < 1.0 { "less than 1".into() } else { format!("{readings:.0}") };
         Some(format!(
-            "{:.0} % of the square of what the wrist feels otherwise lies in {readings} % of its readings, where the {only} tool touches the object and the {other} one does not: \
-             measured contacts begin {:.0} ms or {:.1} mm of the tool's way {when} simulated ones (medians of {} episodes{})",
+            "{:.0} % of the squared error of the wrist lies in the {readings} % of its readings in which the {only} tool touches the object and the {other} one does not: \
+             measured contacts begin {:.0} ms, or {:.1} mm of the tool's path, {when} simulated ones (medians of {} episodes{})",
             100.0 * part.square,
             1e3 * secs.abs(),
             1e3 * way_m.abs(),
             onset.episodes,
             match onset.alike() {
                 Alike::Way =>
-                    "; the way is about the same in each: look at the sizes of tool and object, and at where both are tracked",
+                    "; the distance is about the same in each: look at the sizes of tool and object, and at where both are tracked",
                 Alike::Time => "; the time is about the same in each: look at the clocks of force and pose",
                 Alike::Both =>
                     "; look at the sizes of tool and object, at where both are tracked, and at the clocks of force and pose",

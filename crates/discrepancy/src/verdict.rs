@@ -58,9 +58,9 @@ pub(crate) fn verdict(diagnosis: &Diagnosis, settings: &Settings) -> (Verdict, O
     let reason = if let Some(reason) = is_left(left, chance, closed_fraction, settings) {
         Some(reason)
     } else if everywhere && shows && stands_for_another(before, heldout, fitted, settings) {
-        Some("what comes nearest closes less than half of the gap of a typical episode".into())
+        Some("the nearest effect closes less than half of the gap in a typical episode".into())
     } else if parts.is_empty() && odd > settings.odd {
-        Some(format!("a held-out episode has a mean square of {odd:.1}, where noise has 1"))
+        Some(format!("one held-out episode has a mean square of {odd:.1}; noise alone gives 1"))
     } else {
         None
     };
@@ -77,12 +77,12 @@ pub(crate) fn verdict(diagnosis: &Diagnosis, settings: &Settings) -> (Verdict, O
 fn is_left(trimmed_mean: f64, chance: f64, closed_fraction: f64, settings: &Settings) -> Option<String> {
     let much = trimmed_mean > settings.unexplained && closed_fraction < CLOSED;
     if much || trimmed_mean > HOPELESS {
-        return Some(format!("most episodes are left with a mean square of {trimmed_mean:.2}, where noise has 1"));
+        return Some(format!("most episodes still have a mean square of about {trimmed_mean:.2}; noise alone gives 1"));
     }
     let little = chance < settings.left_by_chance && closed_fraction < NEARLY_CLOSED;
     little.then(|| {
         format!(
-            "what is left is small, but stands out in one channel and phase as chance would once in {:.0} logs",
+            "what is left is small, but no chance: in one channel and phase it stands out as noise does in one log of {:.0}",
             chance.recip()
         )
     })

@@ -32,7 +32,7 @@ pub enum Error {
         problem: String,
     },
     /// A name that chooses no run.
-    #[error("--only {name}: no such table or run `{name}`: expected some of {known}")]
+    #[error("--only {name}: there is no table or run of this name, expected some of {known}")]
     Only {
         /// What was asked for.
         name: String,
@@ -71,7 +71,9 @@ pub enum Error {
         expected: String,
     },
     /// Files that no run of ours has left there.
-    #[error("{file}: is there without a {expected} beside it: choose another --out or remove it")]
+    #[error(
+        "{file}: exists without {expected} beside it, so no run of this program wrote it: choose another --out or remove it"
+    )]
     Foreign {
         /// What is there.
         file: PathBuf,
@@ -130,7 +132,7 @@ pub enum Error {
         source: agent::WorldError,
     },
     /// A world that was another when the run began.
-    #[error("the world says that it is {found}, when the run began it was {expected}")]
+    #[error("the world says that it is {found}, but it was {expected} when the run began")]
     OtherWorld {
         /// Name and version now.
         found: String,

@@ -59,6 +59,22 @@ impl Failure {
     }
 }
 
+/// What worlds did wrong in these trials, in a sentence: the first of it, and how often anything was. `None` where nothing was.
+#[must_use]
+pub fn world_failures<'a>(trials: impl Iterator<Item = &'a TrialRecord>) -> Option<String> {
+    let (mut all, mut first, mut failed) = (0, None, 0);
+    for trial in trials {
+        all += 1;
+        if let Some(failure) = &trial.failure {
+            failed += 1;
+            first.get_or_insert((trial, failure));
+        }
+    }
+    let (trial, failure) = first?;
+    let (method, number) = (trial.method.name(), trial.trial);
+    Some(format!("the world failed in {failed} of {all} trials, first in trial {number} of {method}: {failure}"))
+}
+
 #[cfg(test)]
 mod tests {
     use agent::Method;
@@ -77,6 +93,15 @@ mod tests {
         assert_eq!(at_horizon(10, 11), Some(Failure::OutOfReach));
         assert_eq!(at_horizon(11, 11), Some(Failure::ExcessiveForce));
         assert_eq!(at_horizon(12, 11), Some(Failure::ExcessiveForce));
+    }
+
+    #[test]
+    fn what_worlds_did_wrong_is_told_once_with_its_number() {
+        let good = crate::trial::tests::record();
+        let bad = |trial, failure: &str| TrialRecord { trial, failure: Some(failure.into()), ..good.clone() };
+        assert_eq!(world_failures([&good, &good].into_iter()), None);
+        let sentence = world_failures([&good, &bad(1, "it died"), &bad(2, "it lied")].into_iter()).unwrap();
+        assert_eq!(sentence, "the world failed in 2 of 3 trials, first in trial 1 of no-rnn: it died");
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub use archive::Archive;
 pub use combined::{Arm, Combined, CombinedRow, Common, Comparison, Source, Sources, Total};
 pub use error::Error;
 pub use evaluation::{Evaluation, Request};
-pub use failure::Failure;
+pub use failure::{Failure, world_failures};
 pub use interval::wilson95;
 pub use pace::Pace;
 pub use paired::Pair;

@@ -12,21 +12,22 @@ use clap::Parser;
 use cluster::{Engine, Event, Executor, Outcome};
 use experiments::{Evaluation, Player, Request, Run, Shard, Suite, SuiteRequest};
 use scenario::Selection;
+use whole_file::typed;
 
 /// Plays trials of methods on a domain, or all tables with --all, and prints the table.
 #[derive(Debug, Parser)]
-#[command(name = "eval", version)]
+#[command(name = "eval", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
     #[arg(long, required_unless_present = "all")]
     domain: Option<String>,
-    /// All tables of scenarios/tables, with their pictures.
+    /// Plays all tables of scenarios/tables, and draws their pictures.
     #[arg(long, conflicts_with_all = ["domain", "robot", "preset", "methods", "world", "executor", "worker"])]
     all: bool,
-    /// With --all: plays these tables (table1), runs (table1-paper) or run directories (table1-paper-D3) alone, separated by commas.
+    /// With --all: plays only these tables (table1), runs (table1-paper) or run directories (table1-paper-D3), separated by commas.
     #[arg(long, value_delimiter = ',', requires = "all")]
     only: Vec<String>,
-    /// With --all: Python with mujoco and numpy, for the runs in MuJoCo, which are left out without.
+    /// With --all: Python with mujoco and numpy, for the runs in MuJoCo. Without these modules those runs are left out.
     #[arg(long, default_value = "python3", requires = "all")]
     python: String,
     /// With --all: counts finished runs of another commit as they are, instead of refusing them; the tables name the commit of each.
@@ -38,14 +39,14 @@ struct Arguments {
     /// Arm: sawyer, jaco, or a robot file (docs/src/guides/arm.md).
     #[arg(long, default_value = "sawyer")]
     robot: String,
-    /// Preset of belief and planner.
-    #[arg(long, default_value = "paper")]
+    /// Preset of belief and planner: surmise, paper, or a file.
+    #[arg(long, default_value = scenario::PRESET)]
     preset: String,
-    /// Methods, separated by commas: no-rnn, rnn-max, rnn-sampling, mixture, oracle, heuristic [default: no-rnn,rnn-max,rnn-sampling;
-    /// no-rnn,mixture with preset surmise].
+    /// Methods, separated by commas: no-rnn, rnn-max, rnn-sampling, mixture, oracle, heuristic [default: no-rnn,mixture with preset surmise;
+    /// no-rnn,rnn-max,rnn-sampling with preset paper].
     #[arg(long, value_delimiter = ',')]
     methods: Vec<Method>,
-    /// Trials a method [default: the scenario's].
+    /// Number of trials of each method [default: the scenario's].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: Option<u32>,
     /// Root seed.
@@ -67,10 +68,10 @@ struct Arguments {
     /// Who plays: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
-    /// Tasks that slurm or hq cut the trials into.
+    /// Number of tasks that slurm or hq cut the trials into.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     shards: u32,
-    /// Plays this shard alone, as the tasks of an array do; the tables are made by the command without it.
+    /// Plays only this shard, as the tasks of an array do. The command without --worker makes the tables.
     #[arg(long, value_name = "SHARD")]
     worker: Option<u32>,
     /// Worker threads, each with a world of its own [default: all cores; 1 with a world behind a socket, and in tasks of slurm or hq].
@@ -79,7 +80,7 @@ struct Arguments {
     /// Small budgets: a run of a minute or two whose figures mean nothing.
     #[arg(long)]
     quick: bool,
-    /// A model.toml that `cargo xtask diagnose` wrote: the planner and the belief reckon with its effects (effects.model).
+    /// A model.toml that `cargo xtask diagnose` wrote: planner and belief take its effects into account (effects.model).
     #[arg(long, value_name = "FILE", conflicts_with = "all")]
     model: Option<PathBuf>,
     /// Overrides a scenario entry: key=value.
@@ -98,6 +99,12 @@ struct Arguments {
     #[arg(long)]
     json: bool,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask eval --domain D4 --trials 2
+  cargo xtask eval --domain D4 --preset paper --methods rnn-sampling --trials 2
+  cargo xtask eval --all --quick --only table1";
 
 /// What went wrong after the input was found to be good.
 #[derive(Debug)]
@@ -158,6 +165,11 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
         engine.check()?;
     }
     whole_file::check_owner(&out, "run.json")?;
+    if let (Some(_), None) = (&arguments.model, &arguments.world)
+        && let Some(warning) = evaluation.scenario().truth_warning()
+    {
+        whole_file::say!("{warning}");
+    }
     let run = evaluation.open(&out)?;
     if run.resumed() > 0 {
         whole_file::say!("{} trials are finished already", run.resumed());
@@ -178,7 +190,11 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
         whole_file::out!("{}", serde_json::to_string(&table)?);
     } else {
         whole_file::show(&table.to_markdown());
-        whole_file::say!("written to {}", out.display());
+        if let Some(sentence) = experiments::world_failures(run.trials().context(Failed)?.values()) {
+            whole_file::say!("{sentence}");
+        }
+        whole_file::say!("written to {}", typed(&out));
+        suggest_report(&out);
     }
     Ok(true)
 }
@@ -213,7 +229,8 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
         for table in &tables {
             whole_file::out!("{}", table.to_markdown());
         }
-        whole_file::say!("written to {}", out.display());
+        whole_file::say!("written to {}", typed(&out));
+        suggest_report(&out);
     }
     if arguments.publish {
         let to = root.join("assets/results");
@@ -221,6 +238,12 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
         whole_file::say!("published to {}", to.display());
     }
     Ok(true)
+}
+
+/// What to do with a finished run.
+fn suggest_report(out: &Path) {
+    let report = ["cargo".to_string(), "xtask".into(), "report".into(), typed(out)];
+    whole_file::next(&[(report.to_vec(), "makes a page of it: every trial, every failure")]);
 }
 
 fn timeouts(arguments: &Arguments) -> Timeouts {

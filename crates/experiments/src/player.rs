@@ -69,11 +69,15 @@ fn play_one(evaluation: &Evaluation, method: Method, trial: u32) -> Result<Trial
 /// A step of the progress bar, or a line where there is no terminal.
 fn report(bar: &ProgressBar, record: &TrialRecord) {
     let TrialRecord { method, trial, reason, steps, seconds, failure, .. } = record;
-    if let Some(failure) = failure {
+    if let Some(failure) = failure
+        && !bar.is_hidden()
+    {
         bar.suspend(|| whole_file::say!("{} trial {trial}: {failure}", method.name()));
     }
     bar.inc(1);
     if bar.is_hidden() {
-        whole_file::say!("{} trial {trial}: {} after {steps} actions, {seconds:.1} s", method.name(), reason.name());
+        let why = failure.as_ref().map_or_else(String::new, |failure| format!(" ({failure})"));
+        let (method, reason) = (method.name(), reason.name());
+        whole_file::say!("{method} trial {trial}: {reason} after {steps} actions, {seconds:.1} s{why}");
     }
 }

@@ -9,7 +9,7 @@ use measured_log::{Episode, Error, Format, Log, Notes, import};
 /// Turns published measurements into a log that `cargo xtask diagnose --measured` reads; see
 /// docs/src/reference/measured-log.md.
 #[derive(Debug, Parser)]
-#[command(name = "import-log", version)]
+#[command(name = "import-log", version, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     source: Source,
@@ -18,6 +18,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Source {
     /// Tosses of a cube (ContactNets): a CSV file, or a folder with one tosses_*.csv.
+    #[command(after_help = CONTACTNETS_EXAMPLES)]
     Contactnets {
         /// The file or folder.
         source: PathBuf,
@@ -25,6 +26,7 @@ enum Source {
         target: Target,
     },
     /// Pushes of a triangle (MLab_EXP): one text file, plain or gzip, named or in a folder named after the feet.
+    #[command(after_help = CMU_PUSH_EXAMPLES)]
     CmuPush {
         /// The file.
         source: PathBuf,
@@ -38,7 +40,7 @@ enum Source {
 
 #[derive(Debug, clap::Args)]
 struct Target {
-    /// Folder of the log, without one so far.
+    /// Folder of the log; it must not hold one yet.
     #[arg(long)]
     out: PathBuf,
     /// Format of the samples.
@@ -51,6 +53,17 @@ enum Samples {
     Csv,
     Parquet,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask import-log contactnets tosses.csv --out runs/logs/tosses
+  cargo xtask import-log cmu-push record.txt.gz --out runs/logs/push";
+const CONTACTNETS_EXAMPLES: &str = "\
+Examples:
+  cargo xtask import-log contactnets tosses.csv --out runs/logs/tosses";
+const CMU_PUSH_EXAMPLES: &str = "\
+Examples:
+  cargo xtask import-log cmu-push record.txt.gz --friction-force 5.0 --out runs/logs/push";
 
 fn main() -> ExitCode {
     let (imported, target) = match Arguments::parse().source {
@@ -75,5 +88,7 @@ fn write(target: &Target, log: &Log, notes: &Notes) -> Result<(), Error> {
     measured_log::write(&target.out, log, format, notes)?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
     whole_file::out!("{}: {} episodes, {rows} rows", target.out.display(), log.episodes.len());
+    let words = ["cargo", "xtask", "diagnose", "--measured", &whole_file::typed(&target.out)];
+    whole_file::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the nominal model lacks")]);
     Ok(())
 }

@@ -139,7 +139,8 @@ pub(crate) fn from_safetensors(bytes: &[u8], specs: &[TensorSpec], path: &Path) 
     let (length, rest) = bytes.split_first_chunk::<8>().ok_or_else(|| refuse("shorter than its first field"))?;
     let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| refuse("header too long"))?;
     let (header, data) = rest.split_at_checked(length).ok_or_else(|| refuse("shorter than its header"))?;
-    let header: Map<String, Value> = serde_json::from_slice(header).map_err(|e| refuse(&format!("header: {e}")))?;
+    let header: Map<String, Value> = serde_json::from_slice(header)
+        .map_err(|e| refuse(&format!("header: {}", whole_file::plain(&e.to_string()))))?;
     let read = |spec: &TensorSpec| {
         let expected = format!("F32 {:?}", spec.shape);
         let mismatch = |found: String| Error::Tensor {

@@ -15,10 +15,11 @@ use prior::features::{self, ActionInput};
 use prior::{
     GradientPath, Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, curve_csv, write_atomically,
 };
+use whole_file::typed;
 
 /// Trains the prior: LSTM with a mixture density head over (s, Θ).
 #[derive(Debug, Parser)]
-#[command(name = "train", version)]
+#[command(name = "train", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Arm: sawyer or jaco.
     #[arg(long, default_value = "sawyer")]
@@ -29,7 +30,7 @@ struct Arguments {
     /// Folder of the trained prior [default: runs/priors/ROBOT, runs/quick/priors/ROBOT with --quick].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Most epochs, over which the learning rate falls [default: 100, 10 with --quick].
+    /// Number of epochs, at most; the learning rate falls over all of them [default: 100, 10 with --quick].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     epochs: Option<u32>,
     /// Stops after this many epochs without a better held-out likelihood.
@@ -50,7 +51,7 @@ struct Arguments {
     /// Tells the network the action that led to an observation; the paper does not.
     #[arg(long)]
     action_input: bool,
-    /// Forgets everything after each step: what `calibrate --memoryless` compares with.
+    /// Trains a network that forgets everything after each step, for `calibrate --memoryless`.
     #[arg(long)]
     memoryless: bool,
     /// Root seed.
@@ -62,13 +63,18 @@ struct Arguments {
     /// A few epochs on the quick dataset.
     #[arg(long)]
     quick: bool,
-    /// Insists on going on with an interrupted training. Without it one is gone on with if it is there.
+    /// Fails unless there is an interrupted training to continue. Without this option one is continued where there is one.
     #[arg(long)]
     resume: bool,
     /// Project folder [default: the current one].
     #[arg(long)]
     root: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask train --quick
+  cargo xtask train --robot jaco --epochs 20 --data runs/data/jaco-small --out runs/priors/jaco-small";
 
 /// What went wrong after the input was found to be good.
 #[derive(Debug)]
@@ -168,7 +174,27 @@ fn run(arguments: &Arguments) -> Result<bool> {
         checkpoint.facts.held_out_nll.unwrap_or(f64::NAN),
         checkpoint.facts.held_out_episodes,
     );
+    suggest_next(&arguments.robot, &root, &out);
     Ok(true)
+}
+
+/// Compares the prior with episodes of other worlds, and plays with it.
+fn suggest_next(robot: &str, root: &Path, out: &Path) {
+    let command = |words: &[&str]| ["cargo", "xtask"].iter().chain(words).map(ToString::to_string).collect::<Vec<_>>();
+    let (prior, held_out) = (typed(out), root.join("runs/held-out").join(robot));
+    let mut next = Vec::new();
+    if !held_out.join("meta/info.json").is_file() {
+        let data = typed(&held_out);
+        let words = ["datagen", "--robot", robot, "--seed", "2", "--transitions", "20000", "--out", &data];
+        next.push((command(&words), "makes episodes that it has not seen, for the next command"));
+    }
+    next.push((command(&["calibrate", "--robot", robot, "--prior", &prior]), "compares it with them"));
+    // An arm of a file is called by the file, whose path is not known here.
+    if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
+        let words = ["eval", "--domain", "D4", "--robot", robot, "--prior", &prior, "--trials", "10"];
+        next.push((command(&words), "plays with it"));
+    }
+    whole_file::next(&next);
 }
 
 /// Goes on with the training in `state` where there is one of the same settings, else begins.
@@ -189,7 +215,7 @@ fn open_trainer(
         if let Some(file) = ["prior.json", "curve.csv"].map(|name| out.join(name)).iter().find(|f| f.exists()) {
             let state = state.display();
             return Err(anyhow!(
-                "{}: is there without {state} beside it: choose another --out or remove it",
+                "{}: exists without {state} beside it: choose another --out or remove it",
                 file.display()
             ));
         }

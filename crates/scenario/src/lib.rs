@@ -22,13 +22,14 @@ mod provenance;
 mod schema;
 mod suggest;
 mod tracker;
+mod truth;
 
 pub use assemble::Problem;
 pub use error::Error;
 pub use explain::Explanation;
 pub use file_schema::{FileKind, file_schema};
 pub use layers::{LayerKind, Source};
-pub use load::{Selection, find_root};
+pub use load::{PRESET, Selection, find_root};
 pub use provenance::commit;
 pub use schema::{
     AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,

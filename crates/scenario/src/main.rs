@@ -8,11 +8,12 @@ use std::process::ExitCode;
 
 use anyhow::{Result, anyhow};
 use clap::{Parser, Subcommand};
-use scenario::{Explanation, FileKind, Problem, Scenario, Selection, file_schema, find_root};
+use scenario::{Explanation, FileKind, PRESET, Problem, Scenario, Selection, file_schema, find_root};
+use whole_file::typed;
 
 /// Explains scenario files, and describes their format to editors.
 #[derive(Debug, Parser)]
-#[command(name = "scenario", version)]
+#[command(name = "scenario", version, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     task: Task,
@@ -21,11 +22,13 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Task {
     /// Resolves a scenario, checks it with its arm, and lists every key: value, unit, meaning, and the layer that says so.
+    #[command(after_help = CHECK_EXAMPLES)]
     Check(Check),
     /// Prints the JSON Schema of scenario files, for editors that complete and check TOML; assets/schemas/ holds the same.
     #[command(
         after_help = "In an editor with taplo (\"Even Better TOML\"), the first line of a file in scenarios/ can name it:\n  \
-        #:schema ../assets/schemas/scenario.json"
+        #:schema ../assets/schemas/scenario.json\n\n\
+        Examples:\n  cargo xtask scenario schema\n  cargo xtask scenario schema --robot"
     )]
     Schema {
         /// The schema of robot files (scenarios/robots/) in place of that of all other layers.
@@ -42,8 +45,8 @@ struct Check {
     /// Arm: sawyer, jaco, or a file.
     #[arg(long, default_value = "sawyer")]
     robot: String,
-    /// Preset: paper, surmise, or a file.
-    #[arg(long, default_value = "paper")]
+    /// Preset: surmise, paper, or a file.
+    #[arg(long, default_value = PRESET)]
     preset: String,
     /// With the layer that --quick lays over a preset.
     #[arg(long)]
@@ -65,17 +68,35 @@ struct Check {
     root: Option<PathBuf>,
 }
 
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask scenario check D4
+  cargo xtask scenario schema";
+const CHECK_EXAMPLES: &str = "\
+Examples:
+  cargo xtask scenario check D4
+  cargo xtask scenario check D4 --robot jaco --only planner
+  cargo xtask scenario check D4 --set task.horizon=20 --json";
+
 fn main() -> ExitCode {
-    let result = match Arguments::parse().task {
-        Task::Check(check) => run(&check),
+    let task = Arguments::parse().task;
+    let result = match &task {
+        Task::Check(check) => run(check),
         Task::Schema { robot } => {
-            let kind = if robot { FileKind::Robot } else { FileKind::Scenario };
+            let kind = if *robot { FileKind::Robot } else { FileKind::Scenario };
             Ok(format!("{:#}\n", file_schema(kind)))
         }
     };
     match result {
         Ok(text) => match whole_file::print(&text) {
-            Ok(()) => ExitCode::SUCCESS,
+            Ok(()) => {
+                if let Task::Check(check) = &task
+                    && !check.json
+                {
+                    suggest_next(check);
+                }
+                ExitCode::SUCCESS
+            }
             Err(error) => {
                 whole_file::say!("error: cannot print: {error}");
                 ExitCode::FAILURE
@@ -111,7 +132,32 @@ fn run(check: &Check) -> Result<String> {
             return Err(anyhow!("--only {prefix}: expected the beginning of a key, no key of this scenario has it"));
         }
     }
+    if let Some(warning) = check.model.as_ref().and_then(|_| scenario.truth_warning()) {
+        whole_file::say!("{warning}");
+    }
     Ok(if check.json { json(&scenario, &explanations) } else { text(&scenario, &explanations) })
+}
+
+/// Plays what was checked, with the same choices.
+fn suggest_next(check: &Check) {
+    let mut chosen = vec!["--domain".to_string(), check.domain.clone()];
+    for (option, value, usual) in [("--robot", &check.robot, "sawyer"), ("--preset", &check.preset, PRESET)] {
+        if value != usual {
+            chosen.extend([option.to_string(), value.clone()]);
+        }
+    }
+    chosen.extend(check.quick.then(|| "--quick".into()));
+    chosen.extend(check.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
+    let command = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let model = check.model.iter().flat_map(|path| ["--model".to_string(), typed(path)]);
+    let oracle = ["--methods".to_string(), "oracle,heuristic".to_string()];
+    let eval = [command(&["cargo", "xtask", "eval"]), chosen.clone(), oracle.to_vec(), model.collect()].concat();
+    let mut next = vec![(eval, "plays it with full knowledge, and without a plan: can it be solved?")];
+    if check.model.is_none() {
+        let demo = [command(&["cargo", "xtask", "demo"]), chosen, command(&["--method", "no-rnn"])].concat();
+        next.push((demo, "shows one episode"));
+    }
+    whole_file::next(&next);
 }
 
 fn json(scenario: &Scenario, explanations: &[Explanation]) -> String {

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 use diagnose_benchmark::generate::Actions;
 use diagnose_benchmark::rehearsal::record;
@@ -11,11 +11,11 @@ use discrepancy::ModelFile;
 use measured_log::{Episode, Format, Notes};
 use pomdp::Seed;
 use scenario::{Problem, Selection, find_root};
-use whole_file::Existing;
+use whole_file::{Existing, typed};
 
 /// Records pushes of one object in the true world of a scenario as a log for diagnose, with the effects that the model knows of as model.toml.
 #[derive(Debug, Parser)]
-#[command(name = "record-log", version)]
+#[command(name = "record-log", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Domain: tilted, D1 to D5, obstacle, or a scenario file.
     #[arg(long, default_value = "tilted")]
@@ -26,19 +26,24 @@ struct Arguments {
     /// Overrides a scenario entry: key=value; effects.truth=[…] is what diagnose has to find.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Chosen to tell effects apart, or as they come.
+    /// Pushes: designed to tell effects apart, or passive, as they come.
     #[arg(long, value_enum, default_value = "designed")]
     actions: Actions,
     /// Seed of the object, the pushes and the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder of the log, without one so far.
+    /// Folder of the log; it must not hold one yet.
     #[arg(long)]
     out: PathBuf,
     /// Project folder [default: the nearest one above with scenarios/base.toml].
     #[arg(long)]
     root: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask record-log --domain tilted --actions passive --out runs/rehearsal/log
+  cargo xtask record-log --domain D1 --set 'effects.truth=[{ viscous_damping = { coefficient_nspm = 3.0 } }]' --out runs/rehearsal/viscous";
 
 /// The log is recorded and cannot be kept.
 #[derive(Debug, thiserror::Error)]
@@ -69,16 +74,22 @@ fn run(arguments: &Arguments) -> Result<()> {
     let problem = Problem::assemble(&selection.load()?, &root)?;
     let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
     whole_file::check_owner(&arguments.out, "log.toml")?;
+    let model_file = arguments.out.join("model.toml");
+    if !arguments.out.join("log.toml").exists() && model_file.exists() {
+        bail!("{}: exists without log.toml beside it: choose another --out", model_file.display());
+    }
     match measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new()) {
         Err(taken @ measured_log::Error::Exists { .. }) => return Err(taken.into()),
         Err(error) => return Err(Failed(error.to_string()).into()),
         Ok(()) => {}
     }
     let model = ModelFile::of_effects(problem.scenario.effects.model.clone()).to_toml()?;
-    let model_file = arguments.out.join("model.toml");
     whole_file::write(&model_file, model.as_bytes(), Existing::Replace)
         .map_err(|error| Failed(format!("{error}: {}", error.source)))?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
     whole_file::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
+    let (folder, model) = (typed(&arguments.out), typed(&model_file));
+    let words = ["cargo", "xtask", "diagnose", "--measured", &folder, "--model", &model];
+    whole_file::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the model lacks")]);
     Ok(())
 }

@@ -9,10 +9,11 @@ use dataset::Reader;
 use prior::calibrate::{Calibration, calibrate};
 use prior::features::{self, ActionInput};
 use prior::{Checkpoint, Episode, Models, Sequence, TrainConfig, write_atomically};
+use whole_file::typed;
 
 /// Compares what a prior says with the truth of episodes that it was not trained on.
 #[derive(Debug, Parser)]
-#[command(name = "calibrate", version)]
+#[command(name = "calibrate", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Arm: sawyer or jaco.
     #[arg(long, default_value = "sawyer")]
@@ -39,6 +40,11 @@ struct Arguments {
     #[arg(long)]
     root: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask datagen --seed 2 --out runs/held-out/sawyer
+  cargo xtask calibrate --out runs/calibration/sawyer";
 
 fn main() -> ExitCode {
     match run(&Arguments::parse()) {
@@ -126,7 +132,23 @@ fn run(arguments: &Arguments) -> Result<()> {
         whole_file::out!("{}", serde_json::to_string(&calibration)?);
     } else {
         print(&calibration);
-        whole_file::out!("{}", out.join("calibration.json").display());
+        whole_file::say!("written to {}", typed(&out.join("calibration.json")));
+        let words = [
+            "cargo",
+            "xtask",
+            "eval",
+            "--domain",
+            "D4",
+            "--robot",
+            robot,
+            "--prior",
+            &typed(&folder),
+            "--trials",
+            "10",
+        ];
+        if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
+            whole_file::next(&[(words.map(String::from).to_vec(), "plays with it")]);
+        }
     }
     Ok(())
 }

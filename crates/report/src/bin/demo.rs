@@ -12,10 +12,11 @@ use prior::Suggester;
 use recording::{EpisodeTrace, Moment};
 use report::{Observer, describe, episode_figure, episode_film, episode_page};
 use scenario::{Problem, Scenario, Selection};
+use whole_file::{Owner, typed};
 
 /// Plays one episode, shows it in the terminal, and leaves a moving picture of it from above, a picture of the whole, a page and a trace.
 #[derive(Debug, Parser)]
-#[command(name = "demo", version)]
+#[command(name = "demo", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
     #[arg(long, default_value = "D4")]
@@ -23,8 +24,8 @@ struct Arguments {
     /// Arm: sawyer, jaco, or a robot file (docs/src/guides/arm.md).
     #[arg(long, default_value = "sawyer")]
     robot: String,
-    /// Preset of belief and planner.
-    #[arg(long, default_value = "surmise")]
+    /// Preset of belief and planner: surmise, paper, or a file.
+    #[arg(long, default_value = scenario::PRESET)]
     preset: String,
     /// Method: no-rnn, rnn-max, rnn-sampling, mixture, oracle or heuristic [default: mixture with preset surmise, else rnn-sampling].
     #[arg(long)]
@@ -36,6 +37,9 @@ struct Arguments {
     /// its way.
     #[arg(long, default_value_t = 0)]
     trial: u32,
+    /// Worker threads of search and belief [default: all cores]; the episode does not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
     /// Small budgets: a glance whose result means nothing.
     #[arg(long)]
     quick: bool,
@@ -55,6 +59,11 @@ struct Arguments {
     #[arg(long)]
     json: bool,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask demo
+  cargo xtask demo --domain D3 --robot jaco --trial 4 --quick";
 
 /// What went wrong after the input was found to be good.
 #[derive(Debug, thiserror::Error)]
@@ -85,7 +94,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         set: arguments.set.clone(),
         effects: None,
     };
-    let scenario = selection.load()?;
+    let mut scenario = selection.load()?;
+    scenario.planner.threads = start_threads(arguments.threads).context(Failed)?;
+    let scenario = scenario;
     let problem = Problem::assemble(&scenario, &root)?;
     let method = arguments.method.unwrap_or(match scenario.belief.filter {
         scenario::Filter::Weighted => Method::Mixture,
@@ -103,18 +114,59 @@ fn run(arguments: &Arguments) -> Result<()> {
         let usual = (arguments.seed, arguments.trial) == (1, 0);
         runs.join(if usual { name } else { format!("{name}-seed-{}-trial-{}", arguments.seed, arguments.trial) })
     });
-    whole_file::check_owner(&out, "trace.json")?;
+    let owner = Owner { program: "demo", subject: String::new() };
+    whole_file::check_owner(&out, "trace.json").and_then(|()| owner.check(&out, &FILES)).map_err(|e| taken(&e))?;
     std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display())).context(Failed)?;
     let game = Game { arguments, scenario: &scenario, problem: &problem, method, prior: prior.as_ref() };
     let (record, trace) = game.play(scenario::commit(&root)).context(Failed)?;
+    owner.claim(&out).context(Failed)?;
     write(&trace, &out).context(Failed)?;
     if arguments.json {
         whole_file::print(&format!("{}\n", serde_json::to_string(&record)?)).context(Failed)?;
     } else {
         whole_file::print(&describe::summary(&trace, &record)).context(Failed)?;
-        whole_file::say!("written to {}: animation.png, episode.png, episode.html, trace.json", out.display());
+        whole_file::say!("written to {}: {}", typed(&out), FILES.join(", "));
+        suggest_next(arguments, &out);
     }
     Ok(())
+}
+
+/// What is left in the folder.
+const FILES: [&str; 5] = ["animation.png", "episode.png", "episode.svg", "episode.html", "trace.json"];
+
+/// A folder that holds something else.
+fn taken(error: &whole_file::Error) -> anyhow::Error {
+    anyhow::anyhow!("{error}: {}", error.source)
+}
+
+/// Starts the threads that simulate particles, and says how many trees are searched at a time.
+fn start_threads(asked: Option<u32>) -> Result<usize> {
+    // 0 is for all cores. What the search does with more threads than it has trees is nothing.
+    rayon::ThreadPoolBuilder::new().num_threads(asked.unwrap_or(0) as usize).build_global()?;
+    Ok(rayon::current_num_threads())
+}
+
+/// The same task again, in numbers or step by step.
+fn suggest_next(arguments: &Arguments, out: &Path) {
+    whole_file::say!("open {} in a browser to see it step by step", typed(&out.join("episode.html")));
+    let mut eval: Vec<String> = ["cargo", "xtask", "eval", "--domain", &arguments.domain].map(String::from).to_vec();
+    let chosen = [("--robot", &arguments.robot, "sawyer"), ("--preset", &arguments.preset, scenario::PRESET)];
+    for (option, value, usual) in chosen {
+        if value != usual {
+            eval.extend([option.to_string(), value.clone()]);
+        }
+    }
+    if let Some(prior) = &arguments.prior {
+        eval.extend(["--prior".into(), typed(prior)]);
+    }
+    eval.extend(arguments.quick.then(|| "--quick".into()));
+    eval.extend(arguments.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
+    eval.extend(["--trials".to_string(), "10".into()]);
+    let rerun = ["cargo".to_string(), "xtask".into(), "rerun".into(), typed(out)];
+    whole_file::next(&[
+        (eval, "plays more worlds of it, and prints a table"),
+        (rerun.to_vec(), "makes a recording for the Rerun viewer; its first build takes a quarter of an hour"),
+    ]);
 }
 
 /// What is played.

@@ -11,7 +11,7 @@ use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
 
 /// Makes a self-contained HTML page of a run of `eval`, of all tables of `eval --all`, or of an episode of `demo`.
 #[derive(Debug, Parser)]
-#[command(name = "report", version)]
+#[command(name = "report", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Folder of the run: runs/eval/…, runs/all, runs/demo/…, or a published one of assets/results.
     run: PathBuf,
@@ -19,6 +19,11 @@ struct Arguments {
     #[arg(long)]
     out: Option<PathBuf>,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask report runs/demo/D4-sawyer-surmise-mixture
+  cargo xtask report runs/eval/D4-sawyer-surmise";
 
 /// The page is made and cannot be kept.
 #[derive(Debug, thiserror::Error)]
@@ -39,7 +44,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let folder = &arguments.run;
     let out = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
     if !may_be_replaced(&out) {
-        return Err(anyhow!("{}: is there and is no page of ours: choose another --out", out.display()));
+        return Err(anyhow!("{}: exists, and is not a page of this program: choose another --out", out.display()));
     }
     let page = if folder.join("trace.json").is_file() {
         let trace = recording::read(&folder.join("trace.json"))?;
@@ -54,6 +59,6 @@ fn run(arguments: &Arguments) -> Result<()> {
         suite_page(&suite)
     };
     whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace).map_err(Unwritten)?;
-    whole_file::say!("written to {}", out.display());
+    whole_file::say!("written to {}: open it in a browser", whole_file::typed(&out));
     Ok(())
 }
