@@ -144,7 +144,7 @@ fn the_menu_lists_every_verb_and_the_versions_are_said() {
     let menu = end_to_end::run("xtask", "");
     let text = String::from_utf8_lossy(&menu.stdout).into_owned();
     assert!(menu.status.success() && menu.stderr.is_empty(), "{menu:?}");
-    for verb in VERBS.iter().chain(&NOT_HERE) {
+    for verb in VERBS.iter().chain(&["ci", "rerun"]) {
         assert!(text.contains(&format!("\n  {verb:<18}  ")), "{verb} in {text}");
     }
     assert_eq!(text, String::from_utf8_lossy(&end_to_end::run("xtask", "--help").stdout));
