@@ -1,4 +1,4 @@
-//! One run: methods on a domain, from what was asked for to its table.
+//! One run: methods on a domain, from the request to the table.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::{Error, Provenance, Run, RunIdentity, Shard, Table, Worlds};
 pub struct Request {
     /// Scenario.
     pub selection: Selection,
-    /// Methods; those that go with the scenario's filter where there are none.
+    /// Methods. If empty: all that fit the scenario's filter.
     pub methods: Vec<Method>,
     /// Trials a method; the scenario's where `None`.
     pub trials: Option<u32>,
@@ -105,14 +105,14 @@ impl Evaluation {
         format!("{}-{}-{}{world}", s.name, s.robot.name, s.preset)
     }
 
-    /// Ends what only waits: a world that was started to learn what it is.
+    /// Ends the world that was started only to learn its name.
     pub fn rest(&self) {
         if let Some(worlds) = &self.worlds {
             worlds.rest();
         }
     }
 
-    /// Takes over the commit of the run in `folder`, if it is the same run in all else and finished.
+    /// Takes over the commit of the run in `folder`, if that run is finished and differs in nothing else.
     ///
     /// # Errors
     ///
@@ -156,7 +156,7 @@ impl Evaluation {
     }
 }
 
-/// The methods asked for in the order of tables; where none are, those that the filter goes with.
+/// The requested methods in the order of tables. If none: all that fit the filter.
 fn methods(asked: &[Method], filter: Filter) -> Vec<Method> {
     let mut methods = match filter {
         _ if !asked.is_empty() => asked.to_vec(),

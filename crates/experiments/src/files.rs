@@ -1,4 +1,4 @@
-//! Files and folders of runs: written whole or not at all, and never over what is not ours.
+//! Files and folders of runs. They are written whole or not at all, and never over files of others.
 
 use std::path::Path;
 

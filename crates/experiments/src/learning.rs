@@ -23,7 +23,7 @@ impl Quantity {
     pub(crate) const ALL: [Self; 7] =
         [Self::Friction, Self::LogMass, Self::Com, Self::Size, Self::Shape, Self::Obstacle, Self::ObstaclePlace];
 
-    /// Name in files: that of the record's key.
+    /// Name in files: the key of the record.
     pub(crate) const fn name(self) -> &'static str {
         match self {
             Self::Friction => "friction",

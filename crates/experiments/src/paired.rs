@@ -20,7 +20,7 @@ pub struct Pair {
     pub first_only: u32,
     /// Worlds that only the second solved.
     pub second_only: u32,
-    /// Worlds that none solved.
+    /// Worlds that neither solved.
     pub neither: u32,
     /// Exact McNemar test, two-sided: probability of a split at least as uneven if both were as good (McNemar 1947).
     pub p: f64,
@@ -120,7 +120,7 @@ fn sign_flip(differences: impl Iterator<Item = i32>) -> f64 {
     tails.map(|(_, chance)| chance).sum::<f64>().min(1.0)
 }
 
-/// For people, to two digits; what is smaller than any of interest says so.
+/// For people, to two digits. A very small value is written as "below" a limit.
 pub(crate) fn probability(p: f64) -> String {
     if p < 0.001 {
         "< 0.001".into()

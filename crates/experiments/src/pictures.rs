@@ -49,9 +49,9 @@ fn published_rate(row: &Row) -> Estimate {
 
 /// Name of our own values beside the published ones.
 const HERE: &str = "here";
-/// Name of what has no other.
+/// Name for a value without one of its own.
 const QUARTILES: &str = "median and quartiles";
-/// What is drawn of what beliefs learn; the rest is in the files.
+/// The learnt quantities that are drawn. The files hold all of them.
 const SHOWN: [Quantity; 5] =
     [Quantity::Friction, Quantity::LogMass, Quantity::Shape, Quantity::Obstacle, Quantity::ObstaclePlace];
 /// More domains than this stand side by side; up to as many have a panel each.
@@ -189,7 +189,7 @@ fn of_one_domain(plan: &TablePlan, combined: &Combined, domain: &str, curves: &[
     for quantity in SHOWN {
         let of_quantity: Vec<&Curve> = curves.iter().filter(|curve| curve.quantity == quantity).copied().collect();
         let spreads: Vec<&Spread> = of_quantity.iter().flat_map(|curve| curve.steps.iter().flatten()).collect();
-        // Where nothing is unknown there is nothing to learn: the shape on D1, the obstacle on D1 to D3.
+        // A known quantity has no curve: the shape on D1, the obstacle on D1 to D3.
         let share = matches!(quantity, Quantity::Shape | Quantity::Obstacle);
         if spreads.is_empty() || (share && spreads.iter().all(|spread| spread.low == 1.0)) {
             continue;

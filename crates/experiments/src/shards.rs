@@ -49,7 +49,8 @@ pub(crate) enum Log {
 }
 
 impl Log {
-    /// Appends a line, at once, so that a kill leaves whole lines and at most one broken last one. After a write that failed nothing is written any more.
+    /// Appends a line at once, so that a kill leaves whole lines and at most one broken last line. After a failed write
+    /// nothing more is written.
     pub(crate) fn append(&mut self, line: &str) -> Result<(), Error> {
         if let Self::Attempt(folder, shard) = self {
             *self = begin(&folder.join("shards"), shard.index)?;

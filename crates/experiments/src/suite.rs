@@ -10,7 +10,7 @@ use crate::files::{claim, file_error, pretty, write_atomically};
 use crate::plan::{Include, Item, Plan, TablePlan};
 use crate::{Error, Evaluation, Player, Request, learning, pace, pictures};
 
-/// Says whose the folder is.
+/// Marks the folder as ours.
 const IDENTITY: &str = "all.json";
 
 /// What is asked for.
@@ -20,7 +20,7 @@ pub struct SuiteRequest {
     pub root: PathBuf,
     /// Where everything goes.
     pub out: PathBuf,
-    /// Tables, runs or run directories that are played; all where there are none. What is finished of the others is shown too.
+    /// Tables, runs or run directories that are played. If empty: all. Finished runs of the others are shown too.
     pub only: Vec<String>,
     /// Trials a method; the scenario's where `None`.
     pub trials: Option<u32>,
@@ -56,8 +56,8 @@ struct Entry {
 }
 
 impl Suite {
-    /// Loads and checks all runs, and takes the folders of those that are to be played: what is wrong shows before the first trial. `note`
-    /// is told what is left out, and why.
+    /// Loads and checks all runs, and claims the folders of those that are played. So errors show before the first
+    /// trial. `note` is told what is left out, and why.
     ///
     /// # Errors
     ///
@@ -69,7 +69,7 @@ impl Suite {
         let mut entries = Vec::new();
         for (item, chosen) in plan.items().into_iter().zip(chosen) {
             let folder = request.out.join(item.folder());
-            // Of what is not to be played only a run that is there is of interest.
+            // A run that is not played counts only if it exists.
             let wanted = chosen || folder.join("run.json").exists();
             let mut evaluation = if wanted { prepare(&request, &item, note)? } else { None };
             if let Some(evaluation) = evaluation.as_mut().filter(|_| request.keep_finished) {
@@ -275,7 +275,7 @@ fn shown(part: &Part, include: Option<&Include>) -> Part {
     part
 }
 
-/// Whether a trial's world, and what is asked of the robot in it, are the same in both.
+/// Whether a trial has the same world and the same task in both.
 fn same_worlds(a: &Scenario, b: &Scenario) -> bool {
     let method_of_b = Scenario {
         preset: b.preset.clone(),

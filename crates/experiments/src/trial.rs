@@ -104,7 +104,8 @@ pub fn play_watched(
 ///
 /// # Errors
 ///
-/// [`Error::NoWorld`] and [`Error::OtherWorld`] where none can be had; [`Error::Trial`] where the method cannot be played.
+/// [`Error::NoWorld`] and [`Error::OtherWorld`] if there is no suitable world; [`Error::Trial`] if the method cannot be
+/// played.
 pub fn play_external(
     problem: &Problem,
     method: Method,

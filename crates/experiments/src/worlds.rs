@@ -1,4 +1,4 @@
-//! The external worlds of a run: one for each thread that plays, fresh ones for those that failed.
+//! The external worlds of a run: one for each thread that plays. A failed world is replaced.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -21,7 +21,7 @@ impl Worlds {
     ///
     /// # Errors
     ///
-    /// Where it does not start or is of no use for the problem.
+    /// If it does not start or does not fit the problem.
     pub fn start(address: WorldAddress, timeouts: Timeouts, problem: Arc<Problem>) -> Result<Self, WorldError> {
         let first = ExternalWorld::start(&address, timeouts, &problem)?;
         let identity = first.identity().clone();

@@ -44,8 +44,8 @@ impl Component {
     pub const ALL: [Self; 4] = [Self::X, Self::Y, Self::Z, Self::W];
 }
 
-/// A column of readings. `episode`, `time_secs` and `action` are no channels: see [`crate::Episode`]. The order of the variants is that of
-/// the columns that are written.
+/// A column of readings. `episode`, `time_secs` and `action` are not channels: see [`crate::Episode`]. Columns are
+/// written in the order of the variants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Channel {
     /// Commanded tool centre, m, base axes.
@@ -119,7 +119,8 @@ impl Channel {
         }
     }
 
-    /// Largest magnitude that is believed, in the channel's unit: beyond it stands a wrong unit or damage, not a table-top experiment.
+    /// Largest accepted magnitude, in the channel's unit. A table-top experiment stays below it; a larger value means a
+    /// wrong unit or damage.
     #[must_use]
     pub fn limit(self) -> f64 {
         match self {
@@ -131,8 +132,8 @@ impl Channel {
         }
     }
 
-    /// The columns that mean nothing one by one: a position or an orientation is whole or absent. Forces are not among them: rigs exist that
-    /// measure two axes.
+    /// The columns that must be present together: those of a position or an orientation. Forces are left out, because
+    /// some rigs measure only two axes.
     pub(crate) fn group(self) -> Vec<Self> {
         match self {
             Self::Command(_) => Axis::ALL.map(Self::Command).to_vec(),
@@ -146,7 +147,7 @@ impl Channel {
     }
 }
 
-/// The known name that shares the longest beginning with `name`: what was probably meant.
+/// The known name that shares the longest beginning with `name`, as a suggestion.
 pub(crate) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let shared = |other: &str| name.bytes().zip(other.bytes()).take_while(|(a, b)| a == b).count();
     let mut best = None;

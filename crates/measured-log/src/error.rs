@@ -35,7 +35,7 @@ pub enum Error {
         /// What the file has.
         found: u64,
     },
-    /// A text file that is no text, or no TOML.
+    /// A text file that is not text, or not TOML.
     #[error("{} cannot be read: {reason}", path.display())]
     Syntax {
         /// The file.
@@ -93,7 +93,7 @@ pub enum Error {
         /// What was found.
         found: String,
     },
-    /// A row that is not one: another number of cells than the header.
+    /// A row with another number of cells than the header.
     #[error("{}, row {row}: expected {expected} cells, found {found}", path.display())]
     Row {
         /// The file.

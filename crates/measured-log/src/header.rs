@@ -43,7 +43,7 @@ impl Robot {
 pub struct Header {
     /// The arm.
     pub robot: Robot,
-    /// Time between rows, s, nominally: rows may be missing.
+    /// Nominal time between rows, s. Rows may be missing.
     pub period_secs: f64,
     /// Radius of the ball that is the tool, m. Required if `robot` is "none" and there is a tool.
     pub tool_radius_m: Option<f64>,
@@ -57,7 +57,7 @@ pub struct Header {
     pub object: Object,
     /// Standard deviations of the sensors, where known.
     pub noise: Noise,
-    /// The part that is kept for the comparison of before and after.
+    /// The part that is held out to measure the error before and after.
     pub split: SplitConfig,
 }
 
@@ -79,7 +79,7 @@ pub struct Object {
     pub mass_kg: Number,
     /// Centre of mass, m, from the centre of the shape, object axes.
     pub com_m: [Number; 3],
-    /// Principal moments of inertia about the centre of mass, kg m², object axes; that of a uniform solid where absent.
+    /// Principal moments of inertia about the centre of mass, kg m², object axes. If absent: those of a uniform solid.
     pub inertia_kgm2: Option<[Number; 3]>,
     /// Coefficient of restitution.
     pub restitution: Option<Number>,
@@ -196,7 +196,7 @@ impl Header {
 }
 
 impl Shape {
-    /// How far from its origin it goes along each of its axes, m: a centre of mass is within.
+    /// Half extent along each of its axes, m. The centre of mass lies within.
     #[must_use]
     pub fn reach_m(&self) -> [f64; 3] {
         match self {
@@ -257,9 +257,10 @@ impl Object {
     }
 }
 
-/// Smallest of what is more than 0, in units of its key: what is less can be no measure of a thing that robots push, and makes simulations overflow.
+/// Smallest accepted positive value, in the unit of its key. Nothing that robots push is smaller, and smaller values
+/// make simulations overflow.
 const SMALLEST: f64 = 1e-9;
-/// The same of a moment of inertia, kg m²: that of a grain of sand.
+/// The same for a moment of inertia, kg m²: a grain of sand.
 const SMALLEST_INERTIA: f64 = 1e-15;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -270,7 +271,7 @@ enum Range {
     From(f64),
 }
 
-/// Refuses what is not finite, out of range, or uncertain by nothing.
+/// Refuses values that are not finite or out of range, and standard deviations of 0.
 fn within(key: &str, number: Number, range: Range, limit: f64) -> Result<(), Problem> {
     let low = match range {
         Range::Any => -limit,

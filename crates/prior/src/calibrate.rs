@@ -57,8 +57,8 @@ struct Record {
 /// in an episode.
 ///
 /// Some targets do not always apply, such as the size of an obstacle that may be absent. Their rank is conditional on
-/// applying: each class has a label with which the target was seen to apply. Components without it say nothing of its
-/// value.
+/// applying: each class has a label with which the target was seen to apply. Components without that label do not
+/// count.
 #[must_use]
 pub fn calibrate(
     models: Models<'_>,

@@ -1,7 +1,7 @@
 //! Loss and gradient by hand: backpropagation through time on packed batches and the `gemm` crate.
 //!
-//! burn's autodiff records about a hundred small operations a time step; this path needs two products a step and layer and
-//! nothing else that is not element by element. It works on plain vectors and is generic over f32 (training) and f64
+//! burn's autodiff records about a hundred small operations a time step; this path needs two products a step and layer
+//! and otherwise only element-wise operations. It works on plain vectors and is generic over f32 (training) and f64
 //! (finite differences). A test holds it to the gradients of [`crate::network`].
 //!
 //! On one kind of CPU the same seed gives the same bytes for any number of threads. `gemm` picks its kernels by the

@@ -20,15 +20,16 @@ pub struct Layout {
     pub classes: Vec<ClassTarget>,
 }
 
-/// How a continuous target is written, before it is normalised. Densities are those of the written values.
+/// Transform of a continuous target before it is normalised. Densities are densities of the transformed values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Transform {
     /// As it is.
     Identity,
-    /// Its natural logarithm: for what is positive and skewed, such as a mass.
+    /// Its natural logarithm, for positive and skewed values such as a mass.
     Log,
-    /// Its difference from this observation column of the same step: what is measured need not be recalled, only corrected.
+    /// Its difference from this observation column of the same step. The network then corrects a measurement instead of
+    /// recalling it.
     MinusObservation(usize),
 }
 
@@ -65,7 +66,7 @@ pub struct ClassTarget {
 }
 
 impl Layout {
-    /// Continuous targets as they are, from how they are written after `observation`.
+    /// Continuous targets in original units, from transformed ones after `observation`.
     #[must_use]
     pub fn invert(&self, written: &[f64], observation: &[f64]) -> Vec<f64> {
         let each = written.iter().zip(&self.transforms);

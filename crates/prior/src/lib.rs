@@ -110,7 +110,7 @@ pub use suggest::Suggester;
 #[cfg(feature = "training")]
 pub use train::{Trainer, curve_csv, is_held_out};
 
-/// The prior that a program takes for `robot` unless told otherwise: the one trained here (with `quick` one of a quick training first), else
+/// The default prior of a program for `robot`: the one trained here (with `quick` a quickly trained one first), else
 /// the shipped one.
 #[must_use]
 pub fn default_folder(root: &std::path::Path, robot: &str, quick: bool) -> std::path::PathBuf {
@@ -120,8 +120,8 @@ pub fn default_folder(root: &std::path::Path, robot: &str, quick: bool) -> std::
     candidates.into_iter().find(|folder| folder.join(checkpoint::FILE).is_file()).unwrap_or_else(|| at("assets/priors"))
 }
 
-/// The nearest folder at or above `start` with scenarios, else `start`: the programs of this crate need no scenario, only a place for
-/// their default folders.
+/// The nearest folder at or above `start` with scenarios, else `start`. The programs of this crate need no scenario,
+/// only a place for their default folders.
 #[must_use]
 pub fn project_root(start: &std::path::Path) -> std::path::PathBuf {
     let found = start.ancestors().find(|folder| folder.join("scenarios/base.toml").is_file());

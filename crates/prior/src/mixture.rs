@@ -124,7 +124,7 @@ impl Mixture {
         probabilities
     }
 
-    /// ln p(values, classes), where values whose mask is false are integrated out.
+    /// ln p(values, classes). Values with mask false are integrated out.
     ///
     /// # Panics
     ///

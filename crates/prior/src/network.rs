@@ -233,7 +233,7 @@ impl Network {
     ///
     /// # Panics
     ///
-    /// If `dimensions` are not those that the network was made with.
+    /// If the network was made with other `dimensions`.
     #[must_use]
     pub fn loss(&self, batch: &Padded, dropout: Option<&Dropout<f32>>, dimensions: &Dimensions) -> Tensor<1> {
         let (k, d) = (dimensions.components, dimensions.continuous);

@@ -18,7 +18,7 @@ const CONSTANT: f64 = 1e-6;
 pub struct Scale {
     /// Mean over the rows that apply; of an observation the median.
     pub mean: f64,
-    /// Standard deviation over the rows that apply, of an observation from its quartiles; 1 for a column without spread.
+    /// Standard deviation over the rows that apply; for observations from the quartiles. 1 for a column without spread.
     pub stddev: f64,
 }
 

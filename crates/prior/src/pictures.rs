@@ -12,7 +12,7 @@ use crate::settings::EpochReport;
 #[must_use]
 pub fn learning_curve(robot: &str, curve: &[EpochReport]) -> Figure {
     let points = |of: fn(&EpochReport) -> f64| curve.iter().map(|row| (row.epoch as f64, of(row))).collect();
-    // The first epochs are far above the rest; what is of interest starts at the fifth.
+    // The first epochs are far above the rest, so the plot starts at the fifth.
     let usual: Vec<f64> = curve.iter().skip(4).flat_map(|row| [row.training_nll, row.held_out_nll]).collect();
     let limits = usual.iter().copied().reduce(f64::min).zip(usual.iter().copied().reduce(f64::max));
     let limits = limits.filter(|(low, high)| low < high).map(|(low, high)| (low - 0.05 * (high - low), high));
@@ -158,8 +158,8 @@ fn coverage(robot: &str, report: &Calibration) -> Figure {
     }
 }
 
-/// Rank histograms of every continuous target. Steps of one episode share their truth, so that the band is that of one rank an
-/// episode, wider than that of independent steps.
+/// Rank histograms of every continuous target. Steps of one episode share their truth. So the band assumes one rank per
+/// episode, and is wider than for independent steps.
 fn ranks(robot: &str, report: &Calibration) -> Figure {
     let panels = report.parameters.iter().filter(|parameter| parameter.episodes > 0).map(|parameter| {
         let bins = parameter.ranks.len() as f64;

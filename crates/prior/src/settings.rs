@@ -45,7 +45,7 @@ pub struct TrainConfig {
     pub max_epochs: usize,
     /// Stop after this many epochs without a better held-out likelihood.
     pub patience: usize,
-    /// Largest norm of the whole gradient; none leaves it as it is.
+    /// Largest norm of the whole gradient. `None` does not clip.
     pub clip_norm: Option<f64>,
     /// Decoupled weight decay (Loshchilov and Hutter 2019); 0 gives Adam itself.
     pub weight_decay: f64,

@@ -107,7 +107,7 @@ impl Trainer {
     ///
     /// # Errors
     ///
-    /// [`Error::Diverged`] if a gradient is not finite; the trainer is then of no further use, what was saved is.
+    /// [`Error::Diverged`] if a gradient is not finite. Drop the trainer then; its saved checkpoint is still good.
     pub fn epoch(&mut self) -> Result<EpochReport, Error> {
         let epoch = self.curve.len() + 1;
         let mut order: Vec<usize> = (0..self.training.len()).collect();

@@ -1,7 +1,8 @@
-//! An episode as it was seen: what was true, what was believed, what was searched, step by step.
+//! A recorded episode, step by step: the truth, the belief and the search.
 //!
-//! An [`EpisodeTrace`] is plain data that knows nothing of the programs that made it; [`read`] and [`write()`] keep it as JSON. With the feature
-//! `rerun`, the program `to-rerun` makes a recording of it for the [Rerun](https://rerun.io) viewer.
+//! An [`EpisodeTrace`] is plain data, independent of the program that made it. [`read`] and [`write()`] store it as
+//! JSON. With the feature `rerun`, the program `to-rerun` makes a recording of it for the [Rerun](https://rerun.io)
+//! viewer.
 //!
 //! # Example
 //! ```

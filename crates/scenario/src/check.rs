@@ -35,7 +35,7 @@ impl Scenario {
         let names = [("name", &self.name), ("preset", &self.preset), ("robot.name", &self.robot.name)];
         let expected = "1 to 64 letters, digits, `.`, `_`, `-`, first a letter or digit";
         let urdf = self.robot.urdf.to_string_lossy();
-        // Their ranges are the arm's business; what is no number would not even equal itself.
+        // The arm checks their ranges. NaN would not even equal itself.
         let r = &self.robot;
         let mut numbers = r.home_rad.iter().chain(r.tool_rotation.iter().flatten()).chain(r.locked_joints.values());
         check(self.version == VERSION, "version", &format!("{VERSION}"), &self.version)

@@ -15,7 +15,7 @@ pub struct Explanation {
     pub key: String,
     /// Value.
     pub value: Value,
-    /// Unit, empty for a number without one and for what is no number.
+    /// Unit. Empty for a number without one and for other values.
     pub unit: String,
     /// What it is.
     pub meaning: String,
@@ -24,7 +24,7 @@ pub struct Explanation {
 }
 
 impl Selection {
-    /// Reads the layers, merges and checks them, and says of every key of the outcome what it is and where it comes from.
+    /// Reads, merges and checks the layers. For every key of the result it gives meaning, unit and source.
     ///
     /// # Errors
     ///
@@ -81,7 +81,7 @@ struct Place<'a> {
     schema: &'a Schema,
     node: &'a Schema,
     meaning: String,
-    /// What the quantity is whose distribution the keys below describe.
+    /// Meaning of the quantity that the keys below give a distribution.
     context: String,
     unit: String,
 }
@@ -107,7 +107,7 @@ impl Place<'_> {
         Self { schema: self.schema, node: child, meaning, context, unit }
     }
 
-    /// Schema of a key, and what is said of the alternative that it stands for.
+    /// Schema of a key, and the description of the alternative that it stands for.
     fn property<'b>(&self, node: &'b Schema, name: &str) -> (Option<&'b Schema>, Option<&'b str>) {
         if let Some(child) = node["properties"].get(name) {
             return (Some(child), None);
@@ -119,7 +119,7 @@ impl Place<'_> {
         }
     }
 
-    /// The meaning, and that of the alternative that `value` names.
+    /// The meaning, and the meaning of the alternative that `value` names.
     fn said_of(&self, value: &Value) -> String {
         let mut said = [self.context.as_str(), self.meaning.as_str()].join(" ").trim().to_string();
         let node = target(self.schema, self.node);

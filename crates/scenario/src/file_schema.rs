@@ -1,4 +1,4 @@
-//! JSON Schema of scenario files for editors. A file is a layer: it says what it changes and nothing else.
+//! JSON Schema of scenario files for editors. A file is a layer: it holds only what it changes.
 
 use std::collections::BTreeSet;
 

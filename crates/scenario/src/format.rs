@@ -1,4 +1,4 @@
-//! What a scenario file may hold, as JSON Schema. It is made from the types and their doc comments, the limits of effects from
+//! JSON Schema of a scenario file. It is made from the types and their doc comments, the limits of effects from
 //! [`physics_model::effect::Parameter`], units from the names of the keys: there is no second list of keys.
 
 use physics_model::effect::{EffectKind, Parameter};
@@ -13,7 +13,7 @@ pub(crate) const DEFINITIONS: &str = "definitions";
 /// A key's unit, where its name does not say it or a type knows better.
 pub(crate) const UNIT: &str = "x-unit";
 
-/// Types whose keys say how one quantity is distributed: the key above says which.
+/// Types whose keys give the distribution of one quantity. The key above names the quantity.
 pub(crate) const QUANTITY: &str = "x-quantity";
 
 /// Every quantity carries its unit at the end of its name. Longer ends come first.
@@ -72,7 +72,7 @@ fn add_effects(schema: &mut Value) {
                 property.insert("description".into(), description.into());
                 property.insert(UNIT.into(), parameter.unit.into());
                 let [low, high] = parameter.limits;
-                // JSON has no infinity, and what is infinite limits nothing.
+                // JSON has no infinity, and an infinite limit is no limit.
                 let limits = [("minimum", low), ("maximum", high)];
                 for (keyword, limit) in limits.into_iter().filter(|(_, limit)| limit.is_finite()) {
                     property.insert(keyword.into(), limit.into());

@@ -27,7 +27,7 @@ pub(crate) fn plan() -> TablePlan {
     }
 }
 
-/// A run whose methods solved the worlds that `outcomes` says.
+/// A run in which the methods solved the worlds of `outcomes`.
 pub(crate) fn part(run: &str, domain: &str, outcomes: &[(Method, &[bool])]) -> Part {
     let mut trials = Trials::new();
     for &(method, successes) in outcomes {

@@ -6,7 +6,7 @@ use crate::fused::{HALF_LOG_TAU, LOG_STDDEV_LIMITS};
 use crate::normalise::{Normalisation, Scale};
 use crate::{Layout, Sequence};
 
-/// Fewer rows of a structure than this say nothing of its spread: the marginal over all structures is taken.
+/// Fewest rows that give the spread of a structure. Below that the marginal over all structures is used.
 const ENOUGH_ROWS: f64 = 30.0;
 
 /// The sampling distribution as the training data show it: frequencies of the structures (joint labels of all class targets) and,

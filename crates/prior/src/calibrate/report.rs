@@ -24,7 +24,8 @@ pub struct Score {
     pub nll: Likelihoods,
     /// Those that stay the same in an episode alone: Θ.
     pub static_nll: Likelihoods,
-    /// Stated standard deviation of each static target over that of the truth; mean where it applies.
+    /// Stated standard deviation of each static target divided by the standard deviation of the truth, averaged over
+    /// the steps where the target applies.
     pub spread: Vec<f64>,
     /// Mean probability of the true label of each class target.
     pub class_probability: Vec<f64>,
@@ -119,13 +120,15 @@ pub struct Calibration {
     pub obstacle_after_contact_accuracy: Option<f64>,
     /// Episodes of that share.
     pub obstacle_contact_episodes: usize,
-    /// Share of the episodes without an obstacle that end with more than half on `none`. Always saying "something" scores 1 above and 0 here.
+    /// Share of the episodes without an obstacle that end with P(none) above one half. A network that always says
+    /// "obstacle" scores 1 above and 0 here.
     pub no_obstacle_accuracy: Option<f64>,
     /// Mean of the two: one half without any knowledge.
     pub obstacle_balanced_accuracy: Option<f64>,
-    /// Share of the episodes with an obstacle that nothing touched that end with more than half on "something".
+    /// Share of the episodes with an untouched obstacle that end with P(obstacle) above one half.
     pub untouched_obstacle_found: Option<f64>,
-    /// Share of the episodes that touched it with more than half on "something" by steps since the first touch, as long as half of them last.
+    /// Share of the episodes with an obstacle contact that have P(obstacle) above one half, by steps since the first
+    /// contact, as long as half of these episodes last.
     pub obstacle_found_since_touch: Vec<f64>,
     /// One per class target.
     pub classes: Vec<ClassReport>,

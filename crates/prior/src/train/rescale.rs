@@ -11,8 +11,8 @@ use crate::parameters::Parameters;
 const ROUNDS: usize = 4;
 
 impl Trainer {
-    /// `parameters` with the spread of each target, the same factor in all components, at the maximum of the held-out likelihood. The
-    /// factors go into the bias of the log-deviations, so that nothing else has to know of them.
+    /// `parameters` with the spread of each target, the same factor in all components, at the maximum of the held-out
+    /// likelihood. The factors go into the bias of the log-deviations, so that no other part has to know about them.
     #[must_use]
     pub(super) fn rescaled(&self, parameters: &Parameters<f32>) -> Parameters<f32> {
         let (sizes, mut rescaled) = (&self.dimensions, parameters.clone());

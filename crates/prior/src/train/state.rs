@@ -61,7 +61,7 @@ impl Trainer {
         files::commit(dir, FILE, &manifest, &sets)
     }
 
-    /// Goes on with the run saved in `dir`, on the same data: the weights become what they would have been without the stop.
+    /// Continues the run saved in `dir`, on the same data. The weights become the same as without the stop.
     ///
     /// # Errors
     ///
