@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use experiments::TrialRecord;
+use page::number::count;
 use recording::{BodyShape, EpisodeTrace, Moment, SeenBelief};
 
 /// Names of the actions, by number: directions in the base frame.
@@ -76,13 +77,42 @@ pub fn transitions(trace: &EpisodeTrace) -> String {
     let (search, updates) = trace.transitions();
     match updates {
         Some(updates) if updates > 0 => {
-            let total = search + updates;
+            let [total, search, updates] = [search + updates, search, updates].map(count);
             format!("{total} transitions simulated: {search} by the search, {updates} to update the belief")
         }
-        _ => format!("{search} transitions simulated by the search"),
+        _ => format!("{} transitions simulated by the search", count(search)),
     }
 }
 
 fn percent(probability: f64) -> String {
     format!("{:.0} %", 100.0 * probability)
+}
+
+#[cfg(test)]
+mod tests {
+    use recording::SeenSearch;
+
+    use super::*;
+
+    #[test]
+    fn transitions_of_search_and_updates_are_told_apart() {
+        let moment = |search: usize, updates: Option<usize>| Moment {
+            action: Some(0),
+            reward: None,
+            events: Vec::new(),
+            joints: Vec::new(),
+            tool: recording::Pose::default(),
+            truth: None,
+            belief: None,
+            search: Some(SeenSearch { simulations: 1, transitions: search, depth: 1, nodes: 1, actions: Vec::new() }),
+            update_transitions: updates,
+        };
+        let trace = |moments| EpisodeTrace { moments, ..EpisodeTrace::default() };
+        let both = transitions(&trace(vec![moment(4000, Some(1000)), moment(3990, Some(10))]));
+        assert_eq!(both, "9,000 transitions simulated: 7,990 by the search, 1,010 to update the belief");
+        // A method without a belief, and a trace of an older version.
+        for none in [Some(0), None] {
+            assert_eq!(transitions(&trace(vec![moment(4000, none)])), "4,000 transitions simulated by the search");
+        }
+    }
 }
