@@ -22,6 +22,7 @@
 pub mod catalogue;
 pub mod memory;
 pub mod parameter;
+pub mod sheet;
 pub mod signal;
 pub mod unknown;
 
@@ -33,6 +34,7 @@ use crate::theta::{ObjectShape, Theta};
 pub use catalogue::{EffectConfig, EffectKind};
 pub use memory::Memory;
 pub use parameter::{Neutral, Parameter, Parametric, Scale};
+pub use sheet::{Sheet, SheetRow};
 pub use signal::{CommandFilter, CommandSpace, CommandStart, ForceFilter, ToolMoment};
 pub use unknown::{EffectParameter, EffectValue};
 

@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | d | `delay_secs` | s | 0.005 to 0.1 | one control tick to a slow field bus, engineering judgement |
 //!
+//! Shows in tool, force and pose whenever commands change: all of them are late by the same time.
+//!
 //! Acts on the command (A), with linear interpolation between control steps. An action goes on after its last command until the arm has got
 //! there; forces and poses are read over the nominal duration, joint positions when the arm stands.
 

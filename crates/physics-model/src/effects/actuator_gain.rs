@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | g | `gain` | – | 0.8 to 1.2 | engineering judgement |
 //!
+//! Shows in the place of the tool, in free motion too: every move is too long or too short by the same factor.
+//!
 //! Acts on the command (A), of the tool centre for a kinematic arm and of the joints for a dynamic one. It shows in free motion, too.
 
 use schemars::JsonSchema;

@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | F₀ | `pull_off_n` | N | 0.1 to 3 | engineering judgement |
 //!
+//! Shows when the tool moves back: the object follows it, and the force pulls.
+//!
 //! Acts as a pair of forces (F) at the nearest points of tool and object. In contact it adds to the normal force of the two, and so to their
 //! friction; what the wrist feels is the sum. The range stands for what a film or lip stretches before it lets go, and is wide enough for the
 //! first steps of a retreat to lie in it.

@@ -7,6 +7,8 @@
 //! | a | `amplitude` | – | 0.1 to 0.4 | engineering judgement: brushed metal, wood along and across the grain |
 //! | φ₀ | `axis_rad` | rad | 0 to π | direction of most friction |
 //!
+//! Shows in the force by direction: along one axis a push takes more, across it less.
+//!
 //! Acts on the contacts of free bodies with the table (K). Friction stays opposite to the slip. The grain belongs to the table and not to the
 //! object: turning the object changes nothing. What does not slip has no direction and is held by μ.
 

@@ -1,8 +1,12 @@
-//! An arm that gives way: x = x_cmd − F / K, F: what the tool exerts on the world.
+//! An arm that gives way.
+//!
+//! x = x_cmd − F / K, F: what the tool exerts on the world.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | K | `stiffness_npm` | N/m | 500 to 50000 | 0.5 to 50 N/mm is what position- and impedance-controlled arms have |
+//!
+//! Shows in the place of the tool under load: it stays behind its command while it pushes, and not in free motion.
 //!
 //! Acts between the command and the tool (A), on a kinematic arm: the tool becomes a body held by a critically damped spring of K, the same in all
 //! directions, solved implicitly. A dynamic arm has the stiffness of its servos instead. Deflections do not outlive an action: the next one starts,

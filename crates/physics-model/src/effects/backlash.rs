@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | gap | `gap_rad` | rad | 0.0002 to 0.003 | geared arms, engineering judgement |
 //!
+//! Shows in the joints after a reversal: they stand still while the command already moves on.
+//!
 //! Acts on the commanded joint positions (A), the same for every joint. A drive moves by what is commanded, so that a move that goes on in
 //! the same direction has its full length. Where each joint stands in its play outlives the action ([`crate::effect::Memory::play_rad`]);
 //! an episode starts in the middle of it. Needs joints: it does nothing to a tool without an arm.

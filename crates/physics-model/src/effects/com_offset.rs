@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | s | `share_x`, `share_y`, `share_z` | – | up to 0.3 either way | engineering judgement |
 //!
+//! Shows in the yaw: pushed through the middle of a face, the object turns.
+//!
 //! Acts on the object's mass properties (N); its inertia about the centre of mass stays. A sphere has no axes: its centre of mass gets as deep as
 //! the three shares together.
 

@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | F_x, F_y | `force_x_n`, `force_y_n` | N | magnitude 0.02 to 0.5 | engineering judgement |
 //!
+//! Shows in path and force: what slides drifts along the force, and pushes against it take more.
+//!
 //! Acts as a force (F) at the object's centre of mass. A tilt pulls in proportion to the mass instead: a known added weight tells them apart.
 
 use schemars::JsonSchema;

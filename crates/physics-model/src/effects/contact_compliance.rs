@@ -7,6 +7,8 @@
 //! | f | `frequency_hz` | Hz | 20 to 200 | engineering judgement |
 //! | ζ | `damping_ratio` | – | 0.5 to 10 | engineering judgement |
 //!
+//! Shows in the force at contact onset, which rises slowly or rings, and in the height at rest.
+//!
 //! Acts on all contacts (N): the engine has one softness for a world.
 
 use schemars::JsonSchema;

@@ -7,6 +7,8 @@
 //! |---|---|---|---|---|
 //! | r | `radius_m` | m | 0.0005 to 0.02 | engineering judgement |
 //!
+//! Shows in height and tilt when a thrown object lands on an edge or a corner and tips over it.
+//!
 //! Acts on the object's collider (N): boxes and cylinders; a sphere has no edges, and an outline of a log (prism) keeps its own. Mass and inertia stay those
 //! of the nominal model. The radius is held to nine tenths of the smallest half length. Shows in what tumbles; of what is pushed upright only the sole is
 //! smaller, as with `pressure_distribution`. Whether a pose overlaps the table (`feasible`) is asked of the sharp shape.

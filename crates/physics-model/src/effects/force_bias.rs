@@ -1,8 +1,12 @@
-//! An offset of the force sensor: f_read = f + b.
+//! An offset of the force sensor.
+//!
+//! f_read = f + b.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | b | `bias_x_n`, `bias_y_n`, `bias_z_n` | N | magnitude 0.1 to 2 | sensors after taring, engineering judgement |
+//!
+//! Shows in the force at all times, with and without contact: always the same offset.
 //!
 //! Acts on the force readings (O), along the base axes at the tool centre: the tool keeps its orientation, so that axes fixed to the sensor would
 //! only name the components otherwise. An arm with joint torque sensors shows the torques −Jᵀ b.

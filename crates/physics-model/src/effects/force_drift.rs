@@ -1,8 +1,12 @@
-//! An offset of the force sensor that grows: f_read = f + d t, t: time since the episode began.
+//! An offset of the force sensor that grows.
+//!
+//! f_read = f + d t, t: time since the episode began.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | d | `drift_x_nps`, `drift_y_nps`, `drift_z_nps` | N/s | magnitude 0.00017 to 0.0017 | 0.01 to 0.1 N/min, engineering judgement |
+//!
+//! Shows in the force without contact, late in long episodes.
 //!
 //! Acts on the force readings (O), along the base axes at the tool centre, as [`super::ForceBias`].
 

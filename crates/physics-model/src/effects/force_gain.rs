@@ -1,8 +1,12 @@
-//! A wrong gain of the force sensor: (f, τ)_read = g (f, τ).
+//! A wrong gain of the force sensor.
+//!
+//! (f, τ)_read = g (f, τ).
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | g | `gain` | – | 0.75 to 1.25 | 5 to 25 % either way, engineering judgement |
+//!
+//! Shows in the force of every push by the same factor; poses are right, and so is the force in free motion.
 //!
 //! Acts on the force readings (O). From pushing alone it cannot be told from a wrong mass: a known added weight can.
 

@@ -1,8 +1,12 @@
-//! A slow force sensor: τ ḟ_read = f − f_read.
+//! A slow force sensor.
+//!
+//! τ ḟ_read = f − f_read.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | τ | `time_constant_secs` | s | 0.005 to 0.08 | filters of force sensors from 30 Hz down to 2 Hz |
+//!
+//! Shows in the force at contact onset and at release: its edges are late and rounded, while poses are right.
 //!
 //! Acts on the force readings (O), solved exactly for forces that are constant in a control step. It starts settled at its first reading: the arm
 //! has stood still before.

@@ -1,8 +1,12 @@
-//! A force sensor at the end of its range: each component of the force is read as clamp(f, −limit, limit).
+//! A force sensor at the end of its range.
+//!
+//! f_read = clamp(f, −limit, limit), each component of the force by itself.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | limit | `limit_n` | N | 1 to 50 | small tactile sensors to wrist sensors, engineering judgement |
+//!
+//! Shows in the peaks of the force: they are cut off at one value.
 //!
 //! Acts on the force readings (O), along the base axes. Neutral is an infinite limit.
 

@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | μ | `coefficient` | – | 0.1 to 0.8 | dry sliding of common materials, engineering judgement |
 //!
+//! Shows in the force of every push by the same factor, and in how far the object slides after it is let go.
+//!
 //! Acts on the object's material (N). It is what Θ's own friction is, so that a model in which that one is unknown has no use for this: it is for
 //! logs whose friction was given as known.
 

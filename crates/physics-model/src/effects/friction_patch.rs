@@ -8,6 +8,8 @@
 //! | centre | `x_m`, `y_m` | m | where things can be in reach of an arm | – |
 //! | radius | `radius_m` | m | 0.02 to 0.2 | engineering judgement |
 //!
+//! Shows in force and yaw at one place of the table: there a push takes more or less force, or turns the object.
+//!
 //! Acts on the contacts of free bodies with the table (K). The engine knows one friction coefficient for all contacts of two shapes, so that the
 //! object gets four support points at its corners or rim, each a shape of its own: a patch under one side of the object turns it.
 

@@ -1,5 +1,7 @@
 //! A body on the table that Θ knows nothing of.
 //!
+//! No equation: one more rigid body, which the object, and the tool, can touch.
+//!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | – | `shape` | – | box, cylinder, sphere | – |
@@ -8,6 +10,8 @@
 //! | yaw | `yaw_rad` | rad | −π to π | – |
 //! | sizes | `size_m` | m | 0.01 to 0.3 each | engineering judgement; as for the object, places that a shape has no use for are not read |
 //! | mass | `mass_kg` | kg | 0.05 to 5 | engineering judgement; of a movable one |
+//!
+//! Shows in path and force at one place: the object stops or turns there, and the push takes more force.
 //!
 //! Acts as a further body of the world (N), upright on the table, with the friction of obstacles. The first size below 2 mm: no body. Where a
 //! movable one has got to outlives the action ([`crate::effect::Memory::hidden`]).

@@ -1,9 +1,13 @@
-//! Friction in the joints: τ = F_v q̇ + F_c sgn q̇.
+//! Friction in the joints.
+//!
+//! τ = F_v q̇ + F_c sgn q̇.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | F_v | `viscous_nmsprad` | N·m·s/rad | 0.03 to 0.09 | what identifications of the Franka Panda report |
 //! | F_c | `coulomb_nm` | N·m | 0.2 to 0.5 | the same |
+//!
+//! Shows in the joint torques during motion, in free motion too: the difference changes its sign with the direction.
 //!
 //! Acts on the torque that the motors give and their sensors read (O, for an arm with joint torque sensors), and as a load on the servos of a
 //! dynamic arm (A), whose joints then lag by τ / K. The sign is softened below 0.01 rad/s. A wrist sensor on a kinematic arm reads none of

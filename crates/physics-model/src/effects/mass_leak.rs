@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | λ | `rate_ps` | 1/s | 0.001 to 0.02 | engineering judgement |
 //!
+//! Shows in the force late in an episode: the same push takes less and less.
+//!
 //! Acts on the object's mass (N), before each control step; the inertia follows in proportion, the centre of mass stays.
 
 use schemars::JsonSchema;

@@ -1,6 +1,7 @@
 //! One file per effect: equation, symbols, units, plausible range and its source, and a test against a closed form.
 //!
-//! Ranges without a source are engineering judgement. Letters say where an effect acts, as in [`crate::effect`].
+//! The docs of each have one form, from which the page of effects is made: see [`crate::effect::sheet`]. Ranges without a source are
+//! engineering judgement. Letters say where an effect acts, as in [`crate::effect`].
 
 pub mod actuation_delay;
 pub mod actuator_gain;
@@ -73,6 +74,20 @@ pub use tether::Tether;
 pub use time_base::TimeBase;
 pub use viscous_damping::ViscousDamping;
 pub use wrist_payload::WristPayload;
+
+/// Names of modules, each with what stands in it: [`crate::effect::sheet`] reads their docs.
+macro_rules! sources {
+    ($($name:ident)+) => {
+        &[$((stringify!($name), include_str!(concat!(stringify!($name), ".rs")))),+]
+    };
+}
+
+pub(crate) const SOURCES: &[(&str, &str)] = sources! {
+    actuation_delay actuator_gain adhesion anisotropic_friction arm_compliance backlash com_offset constant_force contact_compliance
+    edge_rounding force_bias force_drift force_gain force_low_pass force_saturation friction_level friction_patch hidden_obstacle
+    joint_friction mass_leak pose_delay pose_offset pose_rotation pose_scale pressure_distribution quadratic_drag restitution
+    rolling_resistance static_friction stribeck_friction table_tilt tether time_base viscous_damping wrist_payload
+};
 
 #[cfg(test)]
 mod tests {

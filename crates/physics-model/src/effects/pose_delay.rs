@@ -1,8 +1,12 @@
-//! Poses that are read late: p_read(t) = p(t − d).
+//! Poses that are read late.
+//!
+//! p_read(t) = p(t − d).
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | d | `delay_secs` | s | 0.005 to 0.1 | exposure and processing of cameras, engineering judgement |
+//!
+//! Shows in the pose while the object moves: it is late by the same time. At rest it is right.
 //!
 //! Acts on the pose readings (O), by interpolation between control steps; several delays add up. An action ends with what is read at the end of its
 //! nominal duration: how far that lags behind outlives the action ([`crate::effect::Memory`]), the line of older poses does not.

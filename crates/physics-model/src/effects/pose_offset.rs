@@ -1,8 +1,12 @@
-//! Poses that are read beside where they are: p_read = p + o.
+//! Poses that are read beside where they are.
+//!
+//! p_read = p + o.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | o | `offset_x_m`, `offset_y_m`, `offset_z_m` | m | magnitude 0.001 to 0.02 | hand-eye calibrations, engineering judgement |
+//!
+//! Shows in the pose at all times: the object starts to move before, or after, the tool seems to reach it.
 //!
 //! Acts on the pose readings (O), along the base axes.
 

@@ -1,8 +1,12 @@
-//! A pose sensor whose frame is turned about the vertical: p_read = R_z(θ) p, about the origin of the base frame.
+//! A pose sensor whose frame is turned about the vertical.
+//!
+//! p_read = R_z(θ) p, about the origin of the base frame.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
-//! | θ | `yaw_rad` | rad | up to 0.087 (5°) either way | hand-eye calibrations, engineering judgement |
+//! | θ | `yaw_rad` | rad | up to 0.0873 (5°) either way | hand-eye calibrations, engineering judgement |
+//!
+//! Shows in the path: the object seems to leave the line of the push at a constant angle.
 //!
 //! Acts on the pose readings (O), orientations and velocities included.
 

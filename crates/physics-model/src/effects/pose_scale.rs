@@ -1,8 +1,12 @@
-//! Distances that are read longer or shorter: p_read = s p, about the origin of the base frame.
+//! Distances that are read longer or shorter.
+//!
+//! p_read = s p, about the origin of the base frame.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | s | `scale` | – | 0.94 to 1.06 | a wrong size of the calibration pattern, engineering judgement |
+//!
+//! Shows in the pose in proportion to the distance from the base, and in the height at rest.
 //!
 //! Acts on the pose readings (O) and on their velocities. In free fall it changes the apparent gravity by s; heights at rest tell it from a wrong
 //! clock.

@@ -7,6 +7,8 @@
 //! |---|---|---|---|---|
 //! | r_eff / R | `radius_share` | – | 0 to 0.7 | 0: a point; 0.67: even pressure of a disc |
 //!
+//! Shows in the yaw: pushed beside its middle, the object turns further.
+//!
 //! Acts on the object's colliders (N): four points at that share of the way from the centre to the corners (box) or the rim (cylinder) touch the table in
 //! their place. The rest of the sole hangs 0.3 mm higher and catches what would tip off them. A sphere touches at a point anyway: no effect.
 

@@ -1,8 +1,12 @@
-//! Quadratic drag of translation: F = −k |v| v.
+//! Quadratic drag of translation.
+//!
+//! F = −k |v| v.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | k = ½ ρ c_d A | `coefficient_ns2pm2` | N·s²/m² | 0.1 to 4 | ½ ρ c_d A: 80 cm² in water with c_d = 1 has 4; in air a thousandth |
+//!
+//! Shows in force and pose at high speed: twice the speed takes four times as much more force.
 //!
 //! Acts as a force (F) at the centre of mass of every free body. Alone it lets the speed decay as v₀ / (1 + k v₀ t / m).
 

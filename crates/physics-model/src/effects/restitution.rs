@@ -1,8 +1,12 @@
-//! Bodies that bounce: v_after = −e v_before along the normal of a new contact.
+//! Bodies that bounce.
+//!
+//! v_after = −e v_before along the normal of a new contact.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | e | `coefficient` | – | 0 to 0.8 | 0: clay; 0.8: a rubber ball |
+//!
+//! Shows in the pose after an impact: the object leaves the tool or the table with a share of the speed.
 //!
 //! Acts on all materials (N); the larger coefficient of two bodies counts.
 

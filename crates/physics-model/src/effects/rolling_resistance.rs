@@ -1,10 +1,13 @@
-//! Rolling resistance: rapier's rigid bodies have none, so without it a sphere would roll for ever.
+//! Rolling resistance.
 //!
-//! τ = c_rr N against the rolling part of the angular velocity, with N = m g of a body on the table.
+//! τ = c_rr N against the rolling part of the angular velocity, with N = m g of a body on the table. Without it a sphere would roll for
+//! ever: rigid bodies of rapier have none.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | c_rr | `lever_m` | m | 0.0001 to 0.005 | engineering judgement; steel on steel below, wood on felt above |
+//!
+//! Shows in the pose of a sphere that was let go: it slows down and stops.
 //!
 //! Acts as a torque (F) on spheres on the table. A sphere rolling without slip slows down by 5/7 c_rr g / r.
 

@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | μ_s / μ_k | `ratio` | – | 1.05 to 1.6 | engineering judgement |
 //!
+//! Shows in the force just before the object starts to slide: it rises above the force of the slide, then falls.
+//!
 //! Acts on the contacts of free bodies with the table (K). The speed below which a contact sticks is above the creep that the solver leaves to
 //! contacts at rest, and far below the Stribeck velocity. That longer rest raises μ_s is left out.
 

@@ -8,6 +8,8 @@
 //! | Δ | `excess` | – | 0.2 to 1 | engineering judgement |
 //! | v_s | `velocity_mps` | m/s | 0.01 to 0.1 | engineering judgement |
 //!
+//! Shows in force and pose when the object is slow: in slow pushes and at the end of a slide.
+//!
 //! Acts on the contacts of free bodies with the table (K). It shows at the end of a slide, and from v_s up hardly at all.
 
 use schemars::JsonSchema;

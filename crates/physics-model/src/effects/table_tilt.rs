@@ -4,7 +4,9 @@
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
-//! | s_x, s_y | `slope_x_rad`, `slope_y_rad` | rad | up to 0.052 (3°) either way | engineering judgement |
+//! | s_x, s_y | `slope_x_rad`, `slope_y_rad` | rad | up to 0.0524 (3°) either way | engineering judgement |
+//!
+//! Shows in path and force: what slides drifts downhill, and pushes uphill take more force than those downhill.
 //!
 //! Acts as the direction of gravity (N): on every body in proportion to its mass.
 

@@ -7,6 +7,8 @@
 //! | k | `stiffness_npm` | N/m | 0.5 to 20 | engineering judgement: a power cord, a rubber band |
 //! | a | `anchor_x_m`, `anchor_y_m` | m | where things can be in reach of an arm | – |
 //!
+//! Shows in force and path: the farther from the anchor, the stronger the pull back to it.
+//!
 //! Acts as a force (F) at the object's centre of mass, by where the centre of its shape is. Alone it lets the object swing with the period
 //! 2π √(m / k).
 

@@ -6,6 +6,8 @@
 //! |---|---|---|---|---|
 //! | r | `rate` | – | 0.94 to 1.06 | a camera that drops or doubles frames, engineering judgement |
 //!
+//! Shows in the pose when nothing drives the object: it seems to fall or to slow down too fast or too slowly.
+//!
 //! Acts on the duration of a control step (N), which really lasts 1 / r of what the clock says, and on the velocity readings (O). Commands and
 //! forces of a log have the same clock.
 

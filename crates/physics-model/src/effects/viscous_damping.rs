@@ -1,8 +1,12 @@
-//! Viscous damping of translation: F = −c v.
+//! Viscous damping of translation.
+//!
+//! F = −c v.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|
 //! | c | `coefficient_nspm` | N·s/m | 0.1 to 2 | engineering judgement: a film of oil, a brush |
+//!
+//! Shows in force and pose: fast pushes take more force than slow ones, and what is let go stops sooner.
 //!
 //! Acts as a force (F) at the centre of mass of every free body. Alone it lets the speed decay as v₀ exp(−c t / m).
 

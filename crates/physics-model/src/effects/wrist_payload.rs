@@ -7,6 +7,8 @@
 //! | m | `mass_kg` | kg | 0.1 to 5 | what arms of this size may carry |
 //! | c | `com_x_m`, `com_y_m`, `com_z_m` | m | up to 0.1 either way | engineering judgement; axes and origin of the tool |
 //!
+//! Shows in the force without contact: the weight is always there, and inertia adds to it when the tool speeds up.
+//!
 //! Acts on the force readings (O): at the wrist, or as the torques −Jᵀ f that the motors give. A position-controlled arm holds the weight: the
 //! tool does not sink.
 
