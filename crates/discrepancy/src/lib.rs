@@ -45,6 +45,7 @@ pub mod fit;
 pub mod heldout;
 pub mod interval;
 pub mod likelihood;
+pub mod listing;
 pub mod locate;
 pub mod model;
 pub mod model_file;

@@ -20,8 +20,8 @@ mod folder;
 #[command(name = "diagnose", version, after_help = EXAMPLES)]
 struct Arguments {
     /// Folder of the log: log.toml with samples.csv or samples.parquet (docs/src/reference/measured-log.md).
-    #[arg(long)]
-    measured: PathBuf,
+    #[arg(long, required_unless_present = "list_effects")]
+    measured: Option<PathBuf>,
     /// Model to begin with instead of the log's nominal one: the model.toml of an earlier diagnosis.
     #[arg(long)]
     model: Option<PathBuf>,
@@ -38,7 +38,10 @@ struct Arguments {
     /// Worker threads, 0 for all cores [default: 0]; the answer does not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
     threads: Option<u64>,
-    /// Prints report.json.
+    /// Lists the effects that can be named: parameters, what shows them, what they are confused with.
+    #[arg(long, conflicts_with_all = ["measured", "model", "out", "fold"])]
+    list_effects: bool,
+    /// Prints report.json, or the list of effects as JSON.
     #[arg(long)]
     json: bool,
     /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
@@ -70,10 +73,12 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         // Fails where a pool exists already: not here.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
     }
-    let log = measured_log::read(&arguments.measured)?;
+    // Clap asks for it unless the effects are to be listed.
+    let Some(measured) = &arguments.measured else { return list_effects(arguments.json) };
+    let log = measured_log::read(measured)?;
     let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
-    let owner = folder::owner(&arguments.measured);
-    let out = arguments.out.clone().unwrap_or_else(|| folder::default(&arguments.measured, &owner, &FILES));
+    let owner = folder::owner(measured);
+    let out = arguments.out.clone().unwrap_or_else(|| folder::default(measured, &owner, &FILES));
     let begun = match &arguments.model {
         Some(path) => Some(begin_with(path, &out, &mut nominal)?),
         None => None,
@@ -86,7 +91,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let clean = || made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
     check_writable(&out).inspect_err(|_| clean())?;
     let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
-    let name = arguments.measured.display().to_string();
+    let name = measured.display().to_string();
     // A log that says too little leaves nothing behind.
     let watched = diagnose_watched(&log, &name, &nominal, &settings, &bar::Bar::new());
     let diagnosis = watched.inspect_err(|_| clean())?;
@@ -105,6 +110,17 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         print_summary(&report);
         suggest_next(arguments, &report, &out, log.header.robot);
     }
+    Ok(())
+}
+
+fn list_effects(json: bool) -> Result<(), Error> {
+    let text = if json {
+        let list = serde_json::to_string_pretty(&discrepancy::listing::effects());
+        list.map_err(|error| Error::Model { reason: error.to_string() })? + "\n"
+    } else {
+        discrepancy::listing::text()
+    };
+    whole_file::show(&text);
     Ok(())
 }
 

@@ -97,6 +97,15 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ),
 ];
 
+/// What logs confuse an effect with, and what separates the two.
+pub fn look_alikes(name: &str) -> impl Iterator<Item = (&'static str, &'static str)> {
+    PAIRS.iter().filter_map(move |(a, b, how)| match (*a == name, *b == name) {
+        (true, _) => Some((*b, *how)),
+        (_, true) => Some((*a, *how)),
+        _ => None,
+    })
+}
+
 /// Of the episodes of a log the one that says most of which of two names it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Telling {
@@ -170,6 +179,17 @@ pub fn next_experiment(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pairs_are_of_effects_and_stand_once() {
+        use physics_model::EffectKind;
+        for (place, (a, b, _)) in PAIRS.iter().enumerate() {
+            assert!(a != b && a.parse::<EffectKind>().is_ok() && b.parse::<EffectKind>().is_ok(), "{a}, {b}");
+            assert!(!PAIRS[..place].iter().any(|(c, d, _)| (c, d) == (a, b) || (c, d) == (b, a)), "{a}, {b}");
+        }
+        assert_eq!(look_alikes("quadratic_drag").map(|(name, _)| name).collect::<Vec<_>>(), ["viscous_damping"]);
+        assert!(look_alikes("viscous_damping").any(|(name, how)| name == "quadratic_drag" && how.contains("speed")));
+    }
 
     #[test]
     fn a_pair_is_told_apart_only_if_one_of_it_is_named() {

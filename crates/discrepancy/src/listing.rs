@@ -1,0 +1,93 @@
+//! All effects that a diagnosis may name, as `diagnose --list-effects` and the page of effects in the book have them.
+
+use physics_model::EffectKind;
+use physics_model::effect::Sheet;
+use serde::Serialize;
+
+use crate::separate::look_alikes;
+
+/// An effect with what it is confused with.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Entry {
+    /// What the docs of the effect say.
+    pub effect: Sheet,
+    /// Effects that leave similar traces, and how to tell them apart.
+    pub look_alikes: Vec<LookAlike>,
+}
+
+/// An effect that leaves similar traces.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LookAlike {
+    /// Its name.
+    pub name: &'static str,
+    /// What to record, or to look at, to tell the two apart.
+    pub tell_apart: &'static str,
+}
+
+/// All effects, in the order of the catalogue.
+#[must_use]
+pub fn effects() -> Vec<Entry> {
+    let entry = |kind: &EffectKind| {
+        let look_alikes = look_alikes(kind.name()).map(|(name, tell_apart)| LookAlike { name, tell_apart });
+        Entry { effect: kind.sheet(), look_alikes: look_alikes.collect() }
+    };
+    EffectKind::ALL.iter().map(entry).collect()
+}
+
+/// Columns of a line of text.
+const COLUMNS: usize = 100;
+
+/// All effects as text for a terminal.
+#[must_use]
+pub fn text() -> String {
+    let mut text = String::new();
+    for entry in effects() {
+        let effect = &entry.effect;
+        text += &format!("{}\n", effect.name);
+        let mut say = |said: &str| text += &wrapped(said);
+        say(&effect.summary);
+        say(&effect.equation);
+        for row in &effect.parameters {
+            let unit = if row.unit == "–" { String::new() } else { format!(" in {}", row.unit) };
+            let neutral = if row.neutral == "–" { String::new() } else { format!("; no effect at: {}", row.neutral) };
+            say(&format!("{} = {}{unit}: {}{neutral}", row.symbol, row.keys.join(", "), row.plausible));
+        }
+        say(&effect.shows);
+        for other in &entry.look_alikes {
+            say(&format!("Looks like {}. To tell: {}.", other.name, other.tell_apart));
+        }
+        text.push('\n');
+    }
+    text + &format!("{} effects. The book shows what each does to a push: cargo xtask docs\n", EffectKind::ALL.len())
+}
+
+/// Lines that begin with four spaces; further ones of the same paragraph with six.
+fn wrapped(paragraph: &str) -> String {
+    let (mut lines, mut line) = (String::new(), "    ".to_owned());
+    for word in paragraph.split_whitespace() {
+        if line.chars().count() + word.chars().count() >= COLUMNS {
+            lines += &format!("{}\n", line.trim_end());
+            line = "      ".into();
+        }
+        line += word;
+        line.push(' ');
+    }
+    lines + line.trim_end() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_effect_is_listed_with_its_parameters_and_its_look_alikes() {
+        let text = text();
+        for kind in EffectKind::ALL {
+            assert!(text.lines().any(|line| line == kind.name()), "{}", kind.name());
+        }
+        assert!(text.lines().all(|line| line.chars().count() <= COLUMNS), "{text}");
+        assert!(text.contains("c = coefficient_nspm in N·s/m: 0.1 to 2; no effect at: 0"), "{text}");
+        assert!(text.contains("Looks like quadratic_drag. To tell: push and release at three speeds"), "{text}");
+        assert_eq!(wrapped(&"word ".repeat(30)).lines().count(), 2);
+    }
+}
