@@ -108,7 +108,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         whole_file::show(&json);
     } else {
         print_summary(&report);
-        suggest_next(arguments, &report, &out, log.header.robot);
+        suggest_next(arguments, measured, &report, &out, log.header.robot);
     }
     Ok(())
 }
@@ -207,14 +207,14 @@ fn print_summary(report: &Report) {
 }
 
 /// What to do with the answer: look at it, ask what is left, plan with it.
-fn suggest_next(arguments: &Arguments, report: &Report, out: &Path, robot: Robot) {
+fn suggest_next(arguments: &Arguments, measured: &Path, report: &Report, out: &Path, robot: Robot) {
     whole_file::say!("open {} in a browser: where, what, how sure", typed(&out.join("report.html")));
     if report.verdict != Verdict::Effect {
         return;
     }
     let command =
         |words: &[&str]| ["cargo", "xtask"].iter().chain(words).map(ToString::to_string).collect::<Vec<String>>();
-    let (log, model) = (typed(&arguments.measured), typed(&out.join("model.toml")));
+    let (log, model) = (typed(measured), typed(&out.join("model.toml")));
     let name = out.file_name().map_or_else(|| "log".into(), |name| name.to_string_lossy().into_owned());
     let again = typed(&out.with_file_name(format!("{name}-again")));
     let mut commands = vec![(
