@@ -149,3 +149,18 @@ fn files_and_functions_stay_small() {
         }
     }
 }
+
+/// Algorithm 1 fits on a screen, and says which of the paper's lines each of its steps is.
+#[test]
+fn algorithm_1_is_one_function_with_the_lines_of_the_paper_in_order() {
+    let path = root().join("crates/agent/src/agent.rs");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let body = text.lines().skip_while(|line| !line.trim_start().starts_with("fn play("));
+    let lines: Vec<&str> = body.take_while(|line| *line != "    }").collect();
+    assert!((10..60).contains(&lines.len()), "{}: `play` has {} lines", path.display(), lines.len() + 1);
+    let numbers: Vec<u32> = lines
+        .iter()
+        .filter_map(|line| line.trim_start().strip_prefix("// ")?.split_once(": ")?.0.parse().ok())
+        .collect();
+    assert_eq!(numbers, [1, 2, 3, 4, 5, 6, 7, 8], "{}: the numbered steps of `play`", path.display());
+}

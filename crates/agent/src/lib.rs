@@ -1,5 +1,8 @@
 //! Algorithm 1 of Hayashi et al. (ICRA 2019): search from the belief, act, observe, let the network suggest, update, prune.
 //!
+//! The loop is `Agent::play` in `agent.rs`, with the line numbers of the paper; what chooses actions and learns from their answers is a
+//! `Controller`: the method of the paper, or one of its two baselines.
+//!
 //! [`Agent::run`] plays one episode on a [`World`] with one [`Method`] and returns its [`Episode`]; a [`Watcher`] may look on. The world is simulated
 //! ([`SimulatedWorld`]) or another program ([`ExternalWorld`]).
 //!
@@ -22,21 +25,24 @@
 
 mod agent;
 mod belief_errors;
-mod births;
+mod controller;
+mod episode_log;
 mod error;
 mod external;
 mod method;
+mod proposals;
 mod record;
 mod watch;
 mod world;
 
 pub use agent::Agent;
 pub use belief_errors::BeliefErrors;
+pub use controller::with_known_joints;
 pub use error::Error;
 pub use external::{
     ExternalEpisode, ExternalWorld, LINE_LIMIT_BYTES, PROTOCOL, Timeouts, WorldAddress, WorldError, WorldIdentity,
 };
 pub use method::Method;
 pub use record::{Episode, Reason, StepRecord};
-pub use watch::{Glimpse, Watcher};
+pub use watch::{StepView, Watcher};
 pub use world::{SimulatedWorld, World, WorldStep};

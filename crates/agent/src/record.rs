@@ -4,7 +4,8 @@ use pomdp::UpdateReport;
 use push_task::{Action, Observation};
 use serde::{Deserialize, Serialize};
 
-use crate::{BeliefErrors, WorldStep};
+use crate::controller::{Decision, Update};
+use crate::{BeliefErrors, WorldError, WorldStep};
 
 /// Why an episode ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -33,6 +34,45 @@ impl Reason {
             Self::Diverged => "diverged",
             Self::WorldFailed => "world-failed",
         }
+    }
+}
+
+/// How an episode ended, with what its [`Reason`] leaves out.
+#[derive(Debug)]
+pub(crate) enum End {
+    /// The object reached the goal region.
+    Goal,
+    /// No actions left.
+    Horizon,
+    /// No particle explains the latest observation.
+    OutOfParticles {
+        /// Transitions that the filter simulated before it gave up.
+        transitions: usize,
+    },
+    /// The true world became impossible.
+    Diverged,
+    /// The world did not answer, or not properly.
+    WorldFailed(WorldError),
+}
+
+impl End {
+    /// The reason.
+    pub(crate) const fn reason(&self) -> Reason {
+        match self {
+            Self::Goal => Reason::Goal,
+            Self::Horizon => Reason::Horizon,
+            Self::OutOfParticles { .. } => Reason::Depleted,
+            Self::Diverged => Reason::Diverged,
+            Self::WorldFailed(_) => Reason::WorldFailed,
+        }
+    }
+
+    /// What the world did wrong, with its causes.
+    pub(crate) fn failure(&self) -> Option<String> {
+        let Self::WorldFailed(error) = self else { return None };
+        let error: &dyn std::error::Error = error;
+        let causes = std::iter::successors(error.source(), |cause| cause.source());
+        Some(causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}")))
     }
 }
 
@@ -66,14 +106,31 @@ pub struct StepRecord {
 }
 
 impl StepRecord {
-    /// Adds what the world answered.
-    pub(crate) fn note_answer(&mut self, answer: &WorldStep) {
+    /// Of a decision, the world's answer to it, and what that changed.
+    pub(crate) fn new(decision: &Decision, answer: &WorldStep, update: &Update) -> Self {
+        let search = decision.search.as_ref();
         let events = answer.report.events;
-        self.observation = answer.observation.clone();
-        self.reward = answer.reward;
-        self.large_force = events.large_force;
-        self.out_of_reach = events.out_of_reach;
-        self.obstacle_touched = answer.report.obstacle_touched;
+        let (update_transitions, report, obstacle_share) = match update {
+            Update::Belief { report, obstacle_share } => {
+                (report.transitions, Some(report.clone()), Some(*obstacle_share))
+            }
+            Update::End(End::OutOfParticles { transitions }) => (*transitions, None, None),
+            Update::End(_) | Update::NoBelief => (0, None, None),
+        };
+        Self {
+            action: decision.action,
+            observation: answer.observation.clone(),
+            reward: answer.reward,
+            value: search.map(|search| search.actions[search.action.index()].value),
+            simulations: search.map_or(0, |search| search.simulations),
+            reused: search.map_or(0, |search| search.reused),
+            transitions: search.map_or(0, |search| search.transitions) + update_transitions,
+            update: report,
+            obstacle_share,
+            large_force: events.large_force,
+            out_of_reach: events.out_of_reach,
+            obstacle_touched: answer.report.obstacle_touched,
+        }
     }
 }
 

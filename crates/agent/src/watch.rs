@@ -8,7 +8,7 @@ use crate::StepRecord;
 
 /// What there is to see before the first action and after each one.
 #[derive(Clone, Copy, Debug)]
-pub struct Glimpse<'a> {
+pub struct StepView<'a> {
     /// Joint positions, rad.
     pub joints_rad: &'a [f64],
     /// True state and parameters, where the world knows them.
@@ -25,10 +25,10 @@ pub struct Glimpse<'a> {
 /// Someone who looks on at an episode, and changes nothing of it.
 pub trait Watcher {
     /// Called before the first action and after each one that the world answered.
-    fn see(&mut self, glimpse: &Glimpse<'_>);
+    fn see(&mut self, view: &StepView<'_>);
 }
 
 /// Nobody.
 impl Watcher for () {
-    fn see(&mut self, _glimpse: &Glimpse<'_>) {}
+    fn see(&mut self, _view: &StepView<'_>) {}
 }

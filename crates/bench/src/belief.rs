@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use agent::with_known_joints;
 use anyhow::Result;
 use belief::Particles;
 use pomdp::{Outcome, Policy as _, Proposals, Purpose, Seed};
 use push_task::{Action, HeuristicPolicy, Observation, Particle};
-use scenario::{Problem, Selection, with_known_joints};
+use scenario::{Problem, Selection};
 use serde_json::{Map, Value, json};
 
 /// Presets that are compared.

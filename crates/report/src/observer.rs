@@ -1,6 +1,6 @@
 //! Looks on at an episode and keeps what a person would want to see.
 
-use agent::{Glimpse, Watcher};
+use agent::{StepView, Watcher};
 use belief::Particles;
 use nalgebra::Isometry3;
 use physics_model::robot::{Robot, ToolShape};
@@ -35,9 +35,9 @@ impl<'a> Observer<'a> {
 }
 
 impl Watcher for Observer<'_> {
-    fn see(&mut self, glimpse: &Glimpse<'_>) {
+    fn see(&mut self, view: &StepView<'_>) {
         let robot = self.model.robot();
-        let step = glimpse.step;
+        let step = view.step;
         let mut events = Vec::new();
         for (happened, words) in [
             (step.is_some_and(|s| s.obstacle_touched), "the obstacle was touched"),
@@ -52,11 +52,11 @@ impl Watcher for Observer<'_> {
             action: step.map(|s| s.action.into()),
             reward: step.map(|s| s.reward),
             events,
-            joints: robot.base_from_joints(glimpse.joints_rad).iter().map(pose).collect(),
-            tool: pose(&robot.base_from_tool(glimpse.joints_rad)),
-            truth: glimpse.truth.map(scene),
-            belief: glimpse.belief.map(|belief| seen(belief, glimpse.truth)),
-            search: glimpse.search.map(|report| SeenSearch {
+            joints: robot.base_from_joints(view.joints_rad).iter().map(pose).collect(),
+            tool: pose(&robot.base_from_tool(view.joints_rad)),
+            truth: view.truth.map(scene),
+            belief: view.belief.map(|belief| seen(belief, view.truth)),
+            search: view.search.map(|report| SeenSearch {
                 simulations: report.simulations,
                 transitions: report.transitions,
                 depth: report.depth,
@@ -65,7 +65,7 @@ impl Watcher for Observer<'_> {
             }),
             // A step counts those of its search as well.
             update_transitions: step
-                .map(|s| s.transitions.saturating_sub(glimpse.search.map_or(0, |search| search.transitions))),
+                .map(|s| s.transitions.saturating_sub(view.search.map_or(0, |search| search.transitions))),
         };
         (self.tell)(&moment);
         self.moments.push(moment);

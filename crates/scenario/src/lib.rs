@@ -35,4 +35,4 @@ pub use schema::{
     AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,
     InitialObstacle, Published, Rollouts, Scenario, VERSION,
 };
-pub use tracker::{Tracker, with_known_joints};
+pub use tracker::Tracker;

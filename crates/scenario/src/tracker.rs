@@ -58,20 +58,3 @@ impl Problem {
         })
     }
 }
-
-/// The arm's own joint positions are known: particles whose simulated move ended elsewhere (stopped by a contact) take them over.
-///
-/// # Errors
-///
-/// Never for a belief that came out of a filter: its weights are a distribution.
-pub fn with_known_joints(
-    particles: Particles<Particle>,
-    joints_rad: &[f64],
-) -> Result<Particles<Particle>, belief::Error> {
-    let weights: Vec<f64> = particles.iter().map(|(_, weight)| weight).collect();
-    let mut states = particles.into_states();
-    for particle in &mut states {
-        particle.state.joints_rad.copy_from_slice(joints_rad);
-    }
-    Particles::weighted(states, weights)
-}

@@ -1,10 +1,14 @@
 use std::path::Path;
 
+use belief::Particles;
 use physics_model::ObjectShape;
-use pomdp::{Outcome, Updater as _};
+use pomdp::{Outcome, Prior as _, Proposals, Purpose, Updater as _};
+use push_task::{Action, Particle};
 use scenario::{Selection, find_root};
 
 use super::*;
+use crate::controller::{obstacle_share, with_known_joints};
+use crate::proposals::{Context, suggest, with_births};
 use crate::{SimulatedWorld, WorldStep};
 
 fn problem(domain: &str, set: &[&str]) -> (Problem, Suggester) {

@@ -1,0 +1,137 @@
+//! The method of the paper: POMCP from a belief that a particle filter keeps.
+
+use belief::Particles;
+use planner::Pomcp;
+use pomdp::{Discretise as _, Proposals, Purpose, Rng, Seed};
+use prior::Suggester;
+use push_task::{Action, Observation, Particle, PushModel};
+use scenario::{Problem, Tracker};
+
+use crate::controller::{Controller, Decision, Update, default_policy};
+use crate::proposals::{Context, Proposer};
+use crate::record::End;
+use crate::{Error, Method, WorldStep};
+
+/// Searches from a belief, which the network helps to keep where the method has one.
+pub(crate) struct FilteredController<'a> {
+    problem: &'a Problem,
+    search: Pomcp<PushModel>,
+    /// `None` once it is out of particles.
+    belief: Option<Particles<Particle>>,
+    filter: Tracker<'a>,
+    proposer: Option<Proposer<'a>>,
+    /// Whether the object has ever been moved.
+    object_moved: bool,
+    streams: Streams,
+}
+
+/// A random stream for each kind of draw.
+struct Streams {
+    search: Rng,
+    filter: Rng,
+    suggestion: Rng,
+}
+
+impl<'a> FilteredController<'a> {
+    /// With the first belief, which knows the first observation; `prior` has seen it too.
+    pub(crate) fn new(
+        problem: &'a Problem,
+        method: Method,
+        prior: Option<&'a mut Suggester>,
+        first: &Observation,
+        seed: Seed,
+    ) -> Result<Self, Error> {
+        let scenario = &problem.scenario;
+        let mut rng = seed.stream(Purpose::InitialBelief, 0);
+        let particles = problem.initial_particles(scenario.belief.particles(), first, &mut rng)?;
+        Ok(Self {
+            problem,
+            search: Pomcp::new(scenario.planner.clone())?,
+            belief: Some(Particles::uniform(particles)?),
+            filter: problem.tracker(first)?,
+            proposer: prior.map(|prior| Proposer::new(problem, method, prior, first)),
+            object_moved: false,
+            streams: Streams {
+                search: seed.stream(Purpose::Search, 0),
+                filter: seed.stream(Purpose::Filter, 0),
+                suggestion: seed.stream(Purpose::Suggestion, 0),
+            },
+        })
+    }
+}
+
+impl Controller for FilteredController<'_> {
+    fn decide(&mut self, _: Option<&Particle>, remaining: usize) -> Result<Decision, Error> {
+        let belief = self.belief.as_ref().expect("an episode ends when it is out of particles");
+        let policy = default_policy(self.problem);
+        let report = self.search.search(&self.problem.model, belief, policy, remaining, &mut self.streams.search);
+        Ok(Decision { action: report.action, search: Some(report) })
+    }
+
+    fn update(&mut self, action: Action, answer: &WorldStep) -> Result<Update, Error> {
+        let model = &self.problem.model;
+        let WorldStep { observation, joints_rad, .. } = answer;
+        // Only moving the object pays more than a plain step; the goal, which pays too, ends the episode.
+        self.object_moved |= answer.reward > self.problem.scenario.task.reward.step;
+        let context = Context { model, observation, joints_rad, object_moved: self.object_moved };
+        let mut belief = self.belief.take().expect("an episode ends when it is out of particles");
+        let mut drawn = Vec::new();
+        if let Some(proposer) = &mut self.proposer {
+            (belief, drawn) = proposer.propose(belief, action, &context, &mut self.streams.suggestion)?;
+        }
+        let density = |particle: &Particle| {
+            self.proposer.as_ref().map_or(f64::NEG_INFINITY, |proposer| proposer.log_density(particle))
+        };
+        let proposals = match &self.proposer {
+            Some(proposer) if proposer.knows_density() => Proposals::weighted(&drawn, &density),
+            _ => Proposals::unweighted(&drawn),
+        };
+        match self.filter.update(model, belief, action, observation, proposals, &mut self.streams.filter) {
+            Ok((belief, report)) => {
+                let obstacle_share = obstacle_share(&belief);
+                self.belief = Some(with_known_joints(belief, joints_rad)?);
+                Ok(Update::Belief { report, obstacle_share })
+            }
+            Err(belief::Error::Depleted { attempts, .. }) => {
+                Ok(Update::End(End::OutOfParticles { transitions: attempts }))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn prune(&mut self, action: Action, observation: &Observation) {
+        self.search.prune(&action, &self.problem.model.key(observation));
+    }
+
+    fn belief(&self) -> Option<&Particles<Particle>> {
+        self.belief.as_ref()
+    }
+}
+
+/// The arm's own joint positions, rad, are known: particles whose simulated move ended elsewhere (stopped by a contact) take them over after
+/// each update.
+///
+/// # Errors
+///
+/// Never for a belief that came out of a filter: its weights are a distribution.
+///
+/// # Panics
+///
+/// Where a particle has another number of joints.
+pub fn with_known_joints(
+    particles: Particles<Particle>,
+    joints_rad: &[f64],
+) -> Result<Particles<Particle>, belief::Error> {
+    let weights: Vec<f64> = particles.iter().map(|(_, weight)| weight).collect();
+    let mut states = particles.into_states();
+    for particle in &mut states {
+        particle.state.joints_rad.copy_from_slice(joints_rad);
+    }
+    Particles::weighted(states, weights)
+}
+
+/// Share of the particles with an obstacle.
+pub(crate) fn obstacle_share(particles: &Particles<Particle>) -> f64 {
+    let with = particles.iter().filter(|(particle, _)| particle.theta.obstacle.is_some());
+    with.map(|(_, weight)| weight).sum()
+}
