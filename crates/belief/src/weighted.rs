@@ -1,5 +1,6 @@
 //! The weighted filter and its parts.
 
+mod advance;
 mod config;
 mod filter;
 mod gaussian;

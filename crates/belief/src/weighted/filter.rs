@@ -2,9 +2,10 @@
 
 use pomdp::{GenerativeModel, Proposals, Rng, StructureReport, UpdateReport, Updater};
 
+use super::advance::Advance;
 use super::config::WeightedConfig;
 use super::prediction::Prediction;
-use super::round::{Advance, Round, Tally, Trackable};
+use super::round::{Round, Tally, Trackable};
 use crate::resample::{Quota, resample};
 use crate::{Error, Particles};
 
