@@ -10,7 +10,8 @@ use std::time::Duration;
 use whole_file::Existing;
 
 use crate::Error;
-use crate::engine::{Active, Engine, Submission};
+use crate::engine::Engine;
+use crate::job::{Active, Submission};
 
 /// Between two looks at the queue: short for short runs, long for what controllers have to bear.
 const FIRST_LOOK: Duration = Duration::from_millis(500);

@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use crate::Error;
 use crate::command::Asked;
-use crate::engine::{Active, Submission, ranges};
+use crate::job::{Active, Submission, ranges};
 
 const NAME: &str = "hq";
 

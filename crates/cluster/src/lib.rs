@@ -34,6 +34,7 @@ mod command;
 mod engine;
 mod error;
 mod hq;
+mod job;
 mod lock;
 mod slurm;
 

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::command::Asked;
-use crate::engine::{Active, Submission, ranges};
+use crate::job::{Active, Submission, ranges};
 
 const NAME: &str = "slurm";
 
