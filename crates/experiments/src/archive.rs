@@ -10,7 +10,7 @@ use whole_file::plain;
 
 use crate::combined::{Combined, Common, Part};
 use crate::files::file_error;
-use crate::run::{parse_trials, read_log};
+use crate::log::{parse_trials, read_log};
 use crate::{Error, Provenance, RunIdentity, Table, TablePlan, TrialRecord, learning, pictures, shards};
 
 /// As many as `eval` plays.

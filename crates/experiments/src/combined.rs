@@ -6,7 +6,8 @@ use agent::Method;
 use scenario::Published;
 use serde::{Deserialize, Serialize};
 
-use crate::paired::{Cells, Trials};
+use crate::log::Trials;
+use crate::paired::Cells;
 use crate::{Failure, Row, Table, TablePlan, wilson95};
 
 mod csv;

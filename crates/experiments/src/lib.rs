@@ -24,6 +24,7 @@ mod failure;
 mod files;
 mod interval;
 mod learning;
+mod log;
 mod pace;
 mod paired;
 mod pictures;

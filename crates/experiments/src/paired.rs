@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use agent::Method;
 use serde::{Deserialize, Serialize};
 
-use crate::TrialRecord;
+use crate::log::Trials;
 
 /// Trials by which of two methods reached the goal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -32,9 +32,6 @@ impl Pair {
         Self { first, second, both, first_only, second_only, neither, p: cells.p() }
     }
 }
-
-/// Trials of a run.
-pub(crate) type Trials = BTreeMap<(Method, u32), TrialRecord>;
 
 /// Numbers of worlds by which of two solved them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -134,6 +131,7 @@ pub(crate) fn probability(p: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::TrialRecord;
 
     #[test]
     fn of_one_domain_the_p_value_is_that_of_mcnemar() {

@@ -1,16 +1,18 @@
 //! Run directories: identity, finished trials, resumption.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
 
 use agent::{Method, WorldIdentity};
-use cluster::Lock;
+use cluster::{Array, Engine, Event, Lock, Outcome};
 use serde::{Deserialize, Serialize};
 
 use crate::files::{check_identity, claim, file_error, pretty, write_atomically};
-use crate::shards::{self, Log, Shard, Trials};
+use crate::log::{Log, Trials, cut_broken_line, parse_trials, read_log};
+use crate::shards::{self, Shard};
 use crate::{Error, Table, TrialRecord};
 
 /// What decides the results of a run. A folder is resumed only by the same run.
@@ -104,7 +106,7 @@ impl Run {
         }
         check_identity(&file, &text, &provenance.run)?;
         let finished = read_trials(folder, &provenance)?;
-        let log = Mutex::new(Log::Attempt(folder.to_path_buf(), shard));
+        let log = Mutex::new(Log::Attempt(folder.to_path_buf(), shard.index));
         Ok(Self { folder: folder.to_path_buf(), provenance, log, finished, shard: Some(shard), _lock: None })
     }
 
@@ -205,6 +207,31 @@ impl Run {
         })?;
         Ok(table)
     }
+
+    /// Plays what is missing in an array of `shards` tasks of an engine, each with `processors` threads.
+    ///
+    /// # Errors
+    ///
+    /// Where the engine refuses, where trials are missing in the end, where a log cannot be read.
+    pub fn play_on(
+        &self,
+        engine: Engine,
+        shards: u32,
+        processors: u32,
+        interrupted: &AtomicBool,
+        report: &mut dyn FnMut(Event),
+    ) -> Result<Outcome, Error> {
+        let array = Array { engine, label: "eval", folder: self.folder(), processors };
+        array.run(|| self.missing_shards(shards), interrupted, report)
+    }
+
+    /// Shards, of `of`, with trials that nobody has finished by now.
+    fn missing_shards(&self, of: u32) -> Result<Vec<u32>, Error> {
+        let finished = self.trials()?;
+        let items = self.items(of).filter(|(_, item)| !finished.contains_key(item));
+        let shards: BTreeSet<u32> = items.map(|(shard, _)| shard.index).collect();
+        Ok(shards.into_iter().collect())
+    }
 }
 
 /// The commit that played the run in `folder`, if it is this one in all else and finished.
@@ -226,44 +253,6 @@ fn read_trials(folder: &Path, provenance: &Provenance) -> Result<Trials, Error> 
     let mut trials = parse_trials(&file, &read_log(&file)?)?;
     // A world that is another program need not do the same twice.
     shards::add(folder, &mut trials, provenance.run.world.is_none())?;
-    Ok(trials)
-}
-
-/// What is in a log; nothing where there is none.
-pub(crate) fn read_log(file: &Path) -> Result<Vec<u8>, Error> {
-    match std::fs::read(file) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        read => read.map_err(file_error(file, "reading")),
-    }
-}
-
-/// The end of the last line that has a line feed: what follows is what a kill left of a write.
-fn whole_lines(text: &[u8]) -> usize {
-    text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1)
-}
-
-/// Cuts what a kill left of a write, so that the next record starts a line of its own. Only for who holds the folder.
-fn cut_broken_line(file: &Path) -> Result<(), Error> {
-    let text = read_log(file)?;
-    let whole = whole_lines(&text);
-    if whole < text.len() {
-        let cut = OpenOptions::new().write(true).open(file).and_then(|f| f.set_len(whole as u64));
-        cut.map_err(file_error(file, "cutting a broken line"))?;
-    }
-    Ok(())
-}
-
-/// Records of a log's whole lines; of two of one trial the first.
-pub(crate) fn parse_trials(file: &Path, text: &[u8]) -> Result<Trials, Error> {
-    let mut trials = Trials::new();
-    for (index, line) in text[..whole_lines(text)].split_inclusive(|byte| *byte == b'\n').enumerate() {
-        let record: TrialRecord = serde_json::from_slice(line).map_err(|e| Error::Record {
-            file: file.to_path_buf(),
-            line: index + 1,
-            message: whole_file::plain(&e.to_string()),
-        })?;
-        trials.entry((record.method, record.trial)).or_insert(record);
-    }
     Ok(trials)
 }
 

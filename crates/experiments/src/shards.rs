@@ -3,20 +3,11 @@
 //! Two attempts at a shard may overlap, where an engine starts a task again that it only thought lost. So each writes a file of its own,
 //! and a trial counts once, whoever played it: all but its time is a function of the run's identity.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
-use std::io::Write as _;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
 
-use agent::Method;
-use cluster::{Array, Engine, Event, Outcome};
-
-use crate::run::{parse_trials, read_log};
-use crate::{Error, Run, TrialRecord};
-
-/// Finished trials.
-pub(crate) type Trials = BTreeMap<(Method, u32), TrialRecord>;
+use crate::Error;
+use crate::log::{Trials, parse_trials, read_log};
 
 /// One of a number of shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,55 +26,6 @@ impl Shard {
         let start = method as u64 * (of as usize).div_ceil(methods.max(1)) as u64;
         Self { index: ((u64::from(trial) + start) % u64::from(of.max(1))) as u32, of }
     }
-}
-
-/// Where a run writes the trials that it plays.
-#[derive(Debug)]
-pub(crate) enum Log {
-    /// The log of the folder's holder.
-    Own(PathBuf, File),
-    /// A worker's, begun with its first trial.
-    Attempt(PathBuf, Shard),
-    /// One that a write has failed in: what follows half a line would be lost.
-    Closed(PathBuf),
-}
-
-impl Log {
-    /// Appends a line at once, so that a kill leaves whole lines and at most one broken last line. After a failed write
-    /// nothing more is written.
-    pub(crate) fn append(&mut self, line: &str) -> Result<(), Error> {
-        if let Self::Attempt(folder, shard) = self {
-            *self = begin(&folder.join("shards"), shard.index)?;
-        }
-        let (path, written) = match self {
-            Self::Own(path, file) => (path, file.write_all(line.as_bytes()).and_then(|()| file.sync_data())),
-            Self::Attempt(path, _) | Self::Closed(path) => {
-                (path, Err(std::io::Error::other("an earlier write failed")))
-            }
-        };
-        let file = path.clone();
-        written.map_err(|source| {
-            *self = Self::Closed(file.clone());
-            Error::File { file, action: "writing", source }
-        })
-    }
-}
-
-/// A new log: two attempts never share one.
-fn begin(folder: &Path, shard: u32) -> Result<Log, Error> {
-    let failed = |source| Error::File { file: folder.to_path_buf(), action: "beginning a log in the folder", source };
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    let mut builder = tempfile::Builder::new();
-    let prefix = format!("{shard:05}-");
-    builder.prefix(&prefix).suffix(".jsonl");
-    #[cfg(unix)]
-    {
-        // As any other new file, less the umask; the default lets only the owner read.
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let (file, path) = builder.tempfile_in(folder).and_then(|file| Ok(file.keep()?)).map_err(failed)?;
-    Ok(Log::Own(path, file))
 }
 
 /// Adds what workers have played to `trials`. A last line without its line feed, of a worker that is at it or was killed, is left out.
@@ -126,36 +68,13 @@ fn logs(folder: &Path) -> Result<BTreeSet<PathBuf>, Error> {
     Ok(paths)
 }
 
-impl Run {
-    /// Plays what is missing in an array of `shards` tasks of an engine, each with `processors` threads.
-    ///
-    /// # Errors
-    ///
-    /// Where the engine refuses, where trials are missing in the end, where a log cannot be read.
-    pub fn play_on(
-        &self,
-        engine: Engine,
-        shards: u32,
-        processors: u32,
-        interrupted: &AtomicBool,
-        report: &mut dyn FnMut(Event),
-    ) -> Result<Outcome, Error> {
-        let array = Array { engine, label: "eval", folder: self.folder(), processors };
-        array.run(|| self.missing_shards(shards), interrupted, report)
-    }
-
-    /// Shards, of `of`, with trials that nobody has finished by now.
-    fn missing_shards(&self, of: u32) -> Result<Vec<u32>, Error> {
-        let finished = self.trials()?;
-        let items = self.items(of).filter(|(_, item)| !finished.contains_key(item));
-        let shards: BTreeSet<u32> = items.map(|(shard, _)| shard.index).collect();
-        Ok(shards.into_iter().collect())
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use agent::Method;
+
     use super::*;
+    use crate::TrialRecord;
+    use crate::log::Log;
 
     #[test]
     fn shards_get_the_same_share_of_every_method() {
@@ -180,8 +99,7 @@ mod tests {
             let record = TrialRecord { trial, ..crate::run::tests::record(Method::NoRnn, trial, true) };
             serde_json::to_string(&record).unwrap() + "\n"
         };
-        let shard = Shard { index: 0, of: 1 };
-        let attempt = || Log::Attempt(folder.path().to_path_buf(), shard);
+        let attempt = || Log::Attempt(folder.path().to_path_buf(), 0);
         let (mut first, mut second, idle) = (attempt(), attempt(), attempt());
         first.append(&line(0)).unwrap();
         second.append(&line(0)).unwrap();
@@ -199,27 +117,10 @@ mod tests {
         add(folder.path(), &mut Trials::new(), true).unwrap();
     }
 
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn after_a_failed_write_nothing_is_written_any_more() {
-        let path = PathBuf::from("/dev/full");
-        let full = std::fs::OpenOptions::new().append(true).open(&path).unwrap();
-        let mut log = Log::Own(path, full);
-        assert!(log.append("1").is_err());
-        let message = error_chain(&log.append("2").unwrap_err());
-        assert!(message.contains("/dev/full") && message.contains("an earlier write failed"), "{message}");
-    }
-
-    #[cfg(target_os = "linux")]
-    fn error_chain(error: &Error) -> String {
-        let causes = std::iter::successors(Some(error as &dyn std::error::Error), |e| e.source());
-        causes.map(ToString::to_string).collect::<Vec<_>>().join(": ")
-    }
-
     #[test]
     fn attempts_that_differ_are_an_error_in_worlds_of_our_own() {
         let folder = tempfile::tempdir().unwrap();
-        let mut log = Log::Attempt(folder.path().to_path_buf(), Shard { index: 3, of: 4 });
+        let mut log = Log::Attempt(folder.path().to_path_buf(), 3);
         let record = crate::run::tests::record(Method::NoRnn, 5, true);
         let other = TrialRecord { actions: vec![1], ..record.clone() };
         log.append(&(serde_json::to_string(&other).unwrap() + "\n")).unwrap();
