@@ -21,9 +21,9 @@ pub enum Error {
         /// What is missing.
         reason: String,
     },
-    /// A scenario or robot of the project cannot be read.
+    /// The arm of a log cannot be found or read.
     #[error(transparent)]
-    Scenario(#[from] scenario::Error),
+    Robot(#[from] physics_model::robot::RobotError),
     /// The folder for the results cannot be made.
     #[error("cannot create {}: {source}", path.display())]
     Folder {

@@ -75,7 +75,7 @@ use std::sync::Arc;
 
 use measured_log::{Axis, Channel, Log, Robot};
 use physics_model::rig::RigTool;
-use scenario::{Problem, Selection, find_root};
+use physics_model::robot::{Robot as Arm, RobotConfig, find_root};
 
 pub use diagnosis::{Diagnosis, Settings, diagnose, diagnose_watched};
 pub use error::Error;
@@ -89,7 +89,7 @@ pub use report::{Report, Verdict};
 ///
 /// # Errors
 ///
-/// [`Error::Scenario`] where the arm's description cannot be read; [`Error::Model`] for a tool without a radius.
+/// [`Error::Robot`] where the arm's description cannot be read; [`Error::Model`] for a tool without a radius.
 pub fn rig_tool(log: &Log, root: Option<&Path>) -> Result<RigTool, Error> {
     let name = match log.header.robot {
         Robot::Sawyer => "sawyer",
@@ -110,7 +110,6 @@ pub fn rig_tool(log: &Log, root: Option<&Path>) -> Result<RigTool, Error> {
         Some(root) => root.to_path_buf(),
         None => find_root(Path::new("."))?,
     };
-    let selection = Selection { robot: name.into(), domain: "D1".into(), ..Selection::new(&root) };
-    let problem = Problem::assemble(&selection.load()?, &root)?;
-    Ok(RigTool::Arm(Arc::new(problem.model.robot().clone())))
+    let config = RobotConfig::read(&root.join("scenarios/robots").join(name).with_extension("toml"))?;
+    Ok(RigTool::Arm(Arc::new(Arm::load(&config, &root)?)))
 }

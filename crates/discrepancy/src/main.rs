@@ -8,6 +8,9 @@ use clap::Parser;
 use discrepancy::interval::decimals;
 use discrepancy::{Error, ModelFile, Nominal, Report, Settings, Verdict, diagnose_watched, page, rig_tool};
 use measured_log::Robot;
+use physics_model::EffectConfig;
+use physics_model::robot::find_root;
+use serde::Deserialize;
 use whole_file::{Existing, typed};
 
 #[path = "program/bar.rs"]
@@ -229,14 +232,26 @@ fn suggest_next(arguments: &Arguments, measured: &Path, report: &Report, out: &P
     whole_file::next(&commands);
 }
 
+/// What every scenario begins with.
+#[derive(Deserialize)]
+struct Base {
+    effects: Lists,
+}
+
+/// Effects of the simulated true world.
+#[derive(Deserialize)]
+struct Lists {
+    truth: Vec<EffectConfig>,
+}
+
 /// The arm of a log in scenarios, and the override that gives a simulated world the effects of the model that was found; none outside a project.
 fn simulated_truth(arguments: &Arguments, out: &Path, robot: Robot) -> Option<(&'static str, String)> {
     let robot = if robot == Robot::Jaco { "jaco" } else { "sawyer" };
-    let root = arguments.root.clone().or_else(|| scenario::find_root(Path::new(".")).ok())?;
-    let selection = scenario::Selection {
-        robot: robot.into(),
-        effects: Some(out.join("model.toml")),
-        ..scenario::Selection::new(root)
-    };
-    Some((robot, selection.load().ok()?.truth_with_model()))
+    let root = arguments.root.clone().or_else(|| find_root(Path::new(".")).ok())?;
+    let base: Base = toml::from_str(&std::fs::read_to_string(root.join("scenarios/base.toml")).ok()?).ok()?;
+    let found = ModelFile::read(&out.join("model.toml")).ok()?;
+    let truth = base.effects.truth;
+    let lacks = |effect: &&EffectConfig| truth.iter().all(|known| known.kind() != effect.kind());
+    let effects: Vec<&EffectConfig> = truth.iter().chain(found.effects().iter().filter(lacks)).collect();
+    Some((robot, format!("effects.truth={}", toml::Value::try_from(effects).ok()?)))
 }

@@ -84,6 +84,12 @@ impl ModelFile {
         }
     }
 
+    /// The effects beyond rigid bodies with Coulomb friction.
+    #[must_use]
+    pub fn effects(&self) -> &[EffectConfig] {
+        &self.effects.model
+    }
+
     /// A model that has these effects, and re-tunes nothing.
     #[must_use]
     pub fn of_effects(model: Vec<EffectConfig>) -> Self {

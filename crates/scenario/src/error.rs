@@ -8,12 +8,6 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// No project folder.
-    #[error("no folder with scenarios/base.toml at {start} or above it: run from inside the project or pass --root")]
-    Root {
-        /// Where the search began.
-        start: PathBuf,
-    },
     /// A domain, robot or preset that has no file.
     #[error("unknown {kind} `{name}`: expected one of {known}, or a path to a .toml file")]
     Unknown {
@@ -75,7 +69,7 @@ pub enum Error {
         /// Key, expectation and value.
         problem: String,
     },
-    /// The arm cannot be loaded.
+    /// The project folder cannot be found, or the arm not be loaded.
     #[error(transparent)]
     Robot(#[from] physics_model::robot::RobotError),
     /// The task cannot be set up.

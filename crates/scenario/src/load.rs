@@ -89,14 +89,9 @@ pub(crate) const SENTENCE: usize = 1000;
 ///
 /// # Errors
 ///
-/// [`Error::Root`] where there is none.
+/// [`Error::Robot`] where there is none.
 pub fn find_root(start: &Path) -> Result<PathBuf, Error> {
-    let absolute = std::path::absolute(start).unwrap_or_else(|_| start.to_path_buf());
-    absolute
-        .ancestors()
-        .find(|folder| folder.join("scenarios/base.toml").is_file())
-        .map(Path::to_path_buf)
-        .ok_or(Error::Root { start: absolute.clone() })
+    Ok(physics_model::robot::find_root(start)?)
 }
 
 fn locate(kind: &'static str, name: &str, folder: &Path) -> Result<PathBuf, Error> {
@@ -210,6 +205,15 @@ mod tests {
                     assert_eq!(scenario.robot.name, robot);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_arm_of_a_scenario_is_the_one_of_its_file() {
+        for robot in ["sawyer", "jaco"] {
+            let file = root().join(format!("scenarios/robots/{robot}.toml"));
+            let scenario = load(|s| s.robot = robot.into()).unwrap();
+            assert_eq!(physics_model::robot::RobotConfig::read(&file).unwrap(), scenario.robot);
         }
     }
 

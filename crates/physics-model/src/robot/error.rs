@@ -8,6 +8,28 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RobotError {
+    /// No folder with the descriptions of arms.
+    #[error("no folder with scenarios/base.toml at {} or above it: run from inside the project or pass --root", .start.display())]
+    Root {
+        /// Where the search began.
+        start: PathBuf,
+    },
+    /// The description of an arm cannot be read.
+    #[error("{}: cannot be read, expected a TOML file with a table [robot]", .path.display())]
+    Open {
+        /// File.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// The description of an arm is no TOML file, or has an unknown, missing or unfit key in its table `[robot]`.
+    #[error("{}: {problem}", .path.display())]
+    Description {
+        /// File.
+        path: PathBuf,
+        /// Line, key and expectation.
+        problem: String,
+    },
     /// The URDF cannot be read.
     #[error("robot.urdf = {}: cannot be read, expected a URDF file", .path.display())]
     Read {
