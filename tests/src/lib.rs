@@ -2,7 +2,6 @@
 
 pub mod slurm;
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::OnceLock;
@@ -14,10 +13,7 @@ pub fn root() -> PathBuf {
     package.parent().unwrap_or(package).to_path_buf()
 }
 
-/// Tells why a test does nothing, past the harness, which shows no output of tests that pass.
-pub fn skipped(reason: &str) {
-    let _ = writeln!(std::io::stderr(), "skipped: {reason}");
-}
+pub use skipped::skipped;
 
 /// A release program, built from this checkout if need be, set to run at its root. All programs are built together, as `xtask` does, and
 /// once for all tests.

@@ -2,7 +2,6 @@
 //!
 //! Needs a Python with `mujoco` and `numpy`: the one that the variable PYTHON names, or python3. Skipped, with the reason, without.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -34,12 +33,12 @@ fn problem(root: &Path) -> Problem {
 }
 
 /// The address of the MuJoCo world, where it can run.
+#[track_caller]
 fn mujoco(root: &Path) -> Option<WorldAddress> {
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
     let found = Command::new(&python).args(["-c", "import mujoco, numpy"]).output();
     if !found.is_ok_and(|output| output.status.success()) {
-        // Past the harness, which shows no output of tests that pass.
-        let _ = writeln!(std::io::stderr(), "skipped: {python} has no mujoco and numpy (set PYTHON to one that has)");
+        skipped::skipped(&format!("{python} has no mujoco and numpy (set PYTHON to one that has)"));
         return None;
     }
     let script: PathBuf = root.join("assets/worlds/mujoco_jaco.py");

@@ -1,6 +1,5 @@
 //! The shipped settings against MuJoCo's recorded answers and closed forms.
 
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use bench::report::{page, summarise};
@@ -83,11 +82,7 @@ fn parts_of_the_hand_that_are_left_out_do_not_matter() {
 #[test]
 fn the_page_in_the_docs_is_the_one_that_the_command_writes() {
     if !cfg!(all(target_arch = "x86_64", target_os = "linux")) {
-        // Past the harness, which shows no output of tests that pass.
-        let _ = writeln!(
-            std::io::stderr(),
-            "skipped: the page was written on x86-64 Linux, whose last digits other machines need not share"
-        );
+        skipped::skipped("the page was written on x86-64 Linux, whose last digits other machines need not share");
         return;
     }
     let committed = std::fs::read_to_string(root().join(report::PAGE)).expect("page");

@@ -8,13 +8,14 @@ use std::process::Command;
 use measured_log::{Axis, Channel, Episode, Log, Shape, import};
 use proptest::prelude::*;
 
-/// The published data, or `None` with the reason printed.
+/// The published data; where they are not there, `None`, and the test counts as skipped.
+#[track_caller]
 fn data(name: &str) -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(name);
     if path.exists() {
         return Some(path);
     }
-    println!("skipped: {} is not there", path.display());
+    skipped::skipped(&format!("{name} of the published data is not beside the workspace"));
     None
 }
 
