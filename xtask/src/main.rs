@@ -65,8 +65,8 @@ enum Verb {
     /// Prints a script that completes these commands in a shell.
     Completions(completions::Options),
     /// Runs exactly what CI runs: formatting, lints, all tests.
-    #[command(after_help = "Examples:\n  cargo xtask ci")]
-    Ci,
+    #[command(after_help = "Examples:\n  cargo xtask ci\n  cargo xtask ci --all-features")]
+    Ci(ci::Options),
 }
 
 #[derive(Debug, clap::Args)]
@@ -100,7 +100,7 @@ fn main() -> ExitCode {
         Verb::Scenario(rest) => become_program("scenario", &rest.arguments),
         Verb::Doctor(options) => doctor::run(&options),
         Verb::Completions(options) => completions::run(&options),
-        Verb::Ci => ci::run(),
+        Verb::Ci(options) => ci::run(&options),
     };
     result.unwrap_or_else(|error| {
         whole_file::complain(&error);

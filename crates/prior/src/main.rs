@@ -42,7 +42,7 @@ struct Arguments {
     /// Decoupled weight decay; the paper has none.
     #[arg(long, default_value_t = 0.0)]
     weight_decay: f64,
-    /// Computes gradients by burn's autodiff on its device, see the cargo features flex, wgpu and cuda, instead of by hand on the CPU.
+    /// Computes gradients by burn's autodiff instead of by hand: slower, and the reference that the other is tested against.
     #[arg(long)]
     autodiff: bool,
     /// Keeps the learning rate at 0.001, as published, instead of letting it fall along half a cosine.

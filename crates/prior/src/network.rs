@@ -8,17 +8,10 @@ use burn::optim::GradientsParams;
 use burn::tensor::activation::{log_softmax, sigmoid};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-/// The device that networks live on: burn's ndarray backend on the CPU, or that of the cargo feature `flex` (CPU), `wgpu` or `cuda` (the
-/// first of several). Only the weights, Adam and the gradient path `autodiff` use it; the fused path and inference run on the CPU.
+/// The device that networks live on: burn's ndarray backend on the CPU. Only the weights, Adam and the gradient path `autodiff` use it; the
+/// fused path and inference do without burn.
 #[must_use]
 pub fn device() -> Device {
-    #[cfg(feature = "cuda")]
-    let device = Device::cuda(0);
-    #[cfg(all(feature = "wgpu", not(feature = "cuda")))]
-    let device = Device::wgpu(burn::tensor::DeviceKind::DefaultDevice);
-    #[cfg(all(feature = "flex", not(any(feature = "cuda", feature = "wgpu"))))]
-    let device = Device::flex();
-    #[cfg(not(any(feature = "cuda", feature = "wgpu", feature = "flex")))]
     #[expect(deprecated, reason = "0.22 is the last burn with the ndarray backend that the project asks for")]
     let device = Device::ndarray();
     device
