@@ -48,17 +48,3 @@ pub fn compare(scene: &Scene, theirs: &Outcome, world: &WorldConfig) -> SceneErr
         theirs: *theirs,
     }
 }
-
-/// The value below which the share `level` in [0, 1] of the values lie (nearest rank).
-///
-/// # Panics
-///
-/// If there are no values.
-#[must_use]
-pub fn quantile(values: impl IntoIterator<Item = f64>, level: f64) -> f64 {
-    let mut sorted: Vec<f64> = values.into_iter().collect();
-    assert!(!sorted.is_empty(), "a quantile of no values");
-    sorted.sort_by(f64::total_cmp);
-    let rank = (level * sorted.len() as f64).ceil() as usize;
-    sorted[rank.clamp(1, sorted.len()) - 1]
-}

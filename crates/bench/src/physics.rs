@@ -22,7 +22,6 @@ use scenario::{Problem, Scenario, Selection};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::accuracy::quantile;
 use crate::peer::Peer;
 use crate::scenes::{MOVE_M, Tool};
 
@@ -179,7 +178,7 @@ fn batch_us(calls: usize, mut call: impl FnMut()) -> f64 {
 }
 
 fn median(values: &[f64]) -> f64 {
-    quantile(values.iter().copied(), 0.5)
+    statistics::nearest_rank(values.iter().copied(), 0.5).expect("at least one batch was timed")
 }
 
 /// Throughput of all cores over that of one, by wall time: a core runs as many actions alone as each of all cores does at once.

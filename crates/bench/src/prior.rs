@@ -20,7 +20,6 @@ use prior::{Dimensions, GradientPath, Inference, Parameters, Sequence};
 use rayon::ThreadPool;
 use serde_json::{Map, Value, json};
 
-use crate::accuracy::quantile;
 use crate::physics::machine;
 use problem::{BATCH, BATCHES, Problem, STEPS};
 use pytorch::PyTorch;
@@ -121,7 +120,7 @@ struct Series(Vec<f64>);
 impl Series {
     /// Median with the extremes and the number of rounds; null without any.
     fn json(&self) -> Value {
-        let at = |level| quantile(self.0.iter().copied(), level);
+        let at = |level| statistics::nearest_rank(self.0.iter().copied(), level).expect("at least one epoch was timed");
         if self.0.is_empty() {
             return Value::Null;
         }
@@ -248,7 +247,7 @@ fn steps(
     agreement.insert("step_outputs".into(), json!({ "difference": difference, "tolerance": OUTPUT_TOLERANCE }));
     // The fastest of those that run without compiling and do the same work.
     let eager = ["lstm", "cells"].into_iter().filter_map(|name| theirs.get(name));
-    let median = |series: &Series| quantile(series.0.iter().copied(), 0.5);
+    let median = |series: &Series| statistics::nearest_rank(series.0.iter().copied(), 0.5).unwrap_or(f64::INFINITY);
     let fastest = eager.min_by(|a, b| median(a).total_cmp(&median(b))).context("expected an eager variant")?;
     let variants: Map<String, Value> = theirs.iter().map(|(name, series)| (name.clone(), series.json())).collect();
     Ok(json!({

@@ -5,8 +5,9 @@ use std::path::Path;
 
 use anyhow::Result;
 use physics_model::config::WorldConfig;
+use statistics::nearest_rank;
 
-use crate::accuracy::{SMALL_FORCE_N, SceneError, compare, quantile};
+use crate::accuracy::{SMALL_FORCE_N, SceneError, compare};
 use crate::closed_forms::measure;
 use crate::scenes::load;
 
@@ -33,7 +34,8 @@ pub struct Summary {
 /// Summary of the errors.
 #[must_use]
 pub fn summarise(errors: &[SceneError]) -> Summary {
-    let both = |values: Vec<f64>| [0.5, 0.9].map(|level| quantile(values.iter().copied(), level));
+    let both =
+        |values: Vec<f64>| [0.5, 0.9].map(|level| nearest_rank(values.iter().copied(), level).unwrap_or(f64::NAN));
     Summary {
         position_mm: both(errors.iter().map(|e| e.position_mm).collect()),
         angle_deg: both(errors.iter().map(|e| e.angle_deg).collect()),

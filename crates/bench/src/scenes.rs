@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context as _, Result, bail};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::motion::minimum_jerk;
 use physics_model::robot::ToolShape;
+use physics_model::state::unit_quaternion;
 use physics_model::world::{ToolPose, World, Wrench};
 use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
 
@@ -220,7 +221,6 @@ fn parse(row: &Row) -> Result<(Scene, Outcome)> {
 #[must_use]
 pub fn pose_error(a: &BodyState, b: &BodyState, turns: bool) -> (f64, f64) {
     let distance = (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm();
-    let rotation = |[x, y, z, w]: [f64; 4]| UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
-    let angle = if turns { rotation(a.orientation).angle_to(&rotation(b.orientation)) } else { 0.0 };
+    let angle = if turns { unit_quaternion(a.orientation).angle_to(&unit_quaternion(b.orientation)) } else { 0.0 };
     (distance, angle)
 }

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use measured_log::{Axis, Channel, Component, Episode, Header, Log, Readings};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use physics_model::BodyState;
 use physics_model::effect::Effect;
 use physics_model::rig::{Rig, RigError, RigObject, RigReading, RigStart};
+use physics_model::state::unit_quaternion;
 use pomdp::{Purpose, Seed};
 use rand_distr::{Distribution as _, StandardNormal};
 
@@ -101,9 +102,7 @@ fn record(
         let reading = row.checked_sub(1).map(|row| &readings[row]);
         let (object, tool) = reading.map_or((seen, *command), |r| (r.object, r.tool_m.unwrap_or(*command)));
         let turn = Vector3::from_fn(|_, _| normal(noise.object_orientation_rad));
-        let [qx, qy, qz, qw] = object.orientation;
-        let q =
-            UnitQuaternion::from_scaled_axis(turn) * UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
+        let q = UnitQuaternion::from_scaled_axis(turn) * unit_quaternion(object.orientation);
         for (i, axis) in Axis::ALL.into_iter().enumerate() {
             push(Channel::Command(axis), Some(command[i]));
             push(Channel::Tool(axis), Some(tool[i] + normal(noise.tool_position_m)));

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use statistics::wilson95;
 
 use crate::generate::Actions;
 use crate::plan::Group;
@@ -106,22 +107,24 @@ impl Table {
     /// As CSV.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut text = String::from("figure,actions,target,value,hits,of,low95,high95\n");
+        let mut rows = Vec::new();
         for row in self.rows.iter().chain(&self.baselines) {
             for (actions, cell, target) in
                 [("designed", row.designed, &row.target[0]), ("passive", row.passive, &row.target[1])]
             {
                 let Some(cell) = cell else { continue };
-                let _ = write!(text, "\"{}\",{actions},\"{target}\",", row.figure);
-                let _ = match cell {
-                    Cell::Share { hits, of, wilson95: [low, high] } => {
-                        writeln!(text, "{:.4},{hits},{of},{low:.4},{high:.4}", f64::from(hits) / f64::from(of))
+                let (value, hits, of, ends) = match cell {
+                    Cell::Share { hits, of, wilson95 } => {
+                        (f64::from(hits) / f64::from(of), hits.to_string(), of, wilson95.map(|end| format!("{end:.4}")))
                     }
-                    Cell::Value { value, of } => writeln!(text, "{value:.4},,{of},,"),
+                    Cell::Value { value, of } => (value, String::new(), of, [String::new(), String::new()]),
                 };
+                let [low, high] = ends;
+                let (value, of) = (format!("{value:.4}"), of.to_string());
+                rows.push(vec![row.figure.clone(), actions.into(), target.clone(), value, hits, of, low, high]);
             }
         }
-        text
+        to_csv(&["figure", "actions", "target", "value", "hits", "of", "low95", "high95"], rows)
     }
 
     /// The confusion matrix as a list: truth, answers with their counts.
@@ -154,11 +157,10 @@ impl Table {
     /// The same as CSV.
     #[must_use]
     pub fn confusion_to_csv(&self) -> String {
-        let mut text = String::from("actions,truth,answer,count\n");
-        for (actions, truth, says, count) in &self.confusion {
-            let _ = writeln!(text, "{},{truth},{says},{count}", actions.name());
-        }
-        text
+        let row = |(actions, truth, says, count): &(Actions, String, String, u32)| {
+            vec![actions.name().into(), truth.clone(), says.clone(), count.to_string()]
+        };
+        to_csv(&["actions", "truth", "answer", "count"], self.confusion.iter().map(row))
     }
 }
 
@@ -311,62 +313,70 @@ fn mean(values: &[f64]) -> Option<Cell> {
 }
 
 fn quantile(mut values: Vec<f64>, share: f64) -> Option<Cell> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    let at = last as f64 * share;
-    let (low, high) = (values[at.floor() as usize], values[at.ceil() as usize]);
-    Some(Cell::Value { value: low + at.fract() * (high - low), of: values.len() as u32 })
-}
-
-/// 95 % Wilson score interval (Wilson 1927).
-#[must_use]
-pub fn wilson95(hits: u32, of: u32) -> [f64; 2] {
-    if of == 0 {
-        return [0.0, 1.0];
-    }
-    let z = 1.959_963_984_540_054_f64;
-    let (n, p) = (f64::from(of), f64::from(hits) / f64::from(of));
-    let scale = 1.0 + z * z / n;
-    let center = (p + z * z / (2.0 * n)) / scale;
-    let half = z / scale * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-    [(center - half).max(0.0), (center + half).min(1.0)]
+    let value = statistics::quantile(&mut values, share)?;
+    Some(Cell::Value { value, of: values.len() as u32 })
 }
 
 /// A line a set.
 #[must_use]
 pub fn sets_to_csv(scores: &[Score]) -> String {
-    let mut text = String::from(
-        "set,actions,group,truth,strength,noise,verdict,named,confidence,first,confused,heldout_before,heldout_after,heldout_true,\
-         heldout_process,closed,channel,rollouts,seconds\n",
-    );
-    for s in scores {
+    let header = [
+        "set",
+        "actions",
+        "group",
+        "truth",
+        "strength",
+        "noise",
+        "verdict",
+        "named",
+        "confidence",
+        "first",
+        "confused",
+        "heldout_before",
+        "heldout_after",
+        "heldout_true",
+        "heldout_process",
+        "closed",
+        "channel",
+        "rollouts",
+        "seconds",
+    ];
+    let row = |s: &Score| {
         let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.4}"));
         let heldout = |i: usize| number(s.heldout.map(|h| h[i]));
-        let _ = writeln!(
-            text,
-            "{},{},{:?},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.1}",
-            s.set,
-            s.actions.name(),
-            s.group,
+        vec![
+            s.set.to_string(),
+            s.actions.name().into(),
+            format!("{:?}", s.group),
             s.truth.join("+"),
-            s.strength,
-            s.noise,
-            s.verdict,
+            s.strength.to_string(),
+            s.noise.to_string(),
+            s.verdict.to_string(),
             s.named.join("+"),
             number(s.confidences.first().copied()),
-            s.first,
-            s.confused,
+            s.first.to_string(),
+            s.confused.to_string(),
             heldout(0),
             heldout(1),
             heldout(2),
             number(s.process),
             number(s.closed()),
-            s.channel.as_deref().unwrap_or(""),
-            s.rollouts,
-            s.seconds
-        );
+            s.channel.clone().unwrap_or_default(),
+            s.rollouts.to_string(),
+            format!("{:.1}", s.seconds),
+        ]
+    };
+    to_csv(&header, scores.iter().map(row))
+}
+
+/// For spreadsheets; quoted where a cell needs it.
+fn to_csv(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    csv.write_record(header).expect("memory takes all, and all rows are as long as the header");
+    for row in rows {
+        csv.write_record(&row).expect("memory takes all, and all rows are as long as the header");
     }
-    text
+    String::from_utf8(csv.into_inner().expect("memory takes all")).expect("made of text")
 }
 
 #[cfg(test)]
@@ -374,15 +384,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn wilson_intervals_are_those_of_newcombe() {
-        for (hits, of, low, high) in [(81, 263, 0.2553, 0.3662), (0, 20, 0.0, 0.1611)] {
-            let [a, b] = wilson95(hits, of);
-            assert!((a - low).abs() < 5e-5 && (b - high).abs() < 5e-5, "{hits}/{of}: [{a}, {b}]");
-        }
-    }
-
-    #[test]
-    fn quantiles_lie_between_neighbours() {
+    fn a_quantile_says_of_how_many_it_is() {
         assert_eq!(quantile(vec![3.0, 1.0, 2.0, 4.0], 0.5), Some(Cell::Value { value: 2.5, of: 4 }));
         assert_eq!(quantile(Vec::new(), 0.5), None);
     }

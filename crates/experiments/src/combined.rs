@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use agent::Method;
 use scenario::Published;
 use serde::{Deserialize, Serialize};
+use statistics::wilson95;
 
 use crate::log::Trials;
 use crate::paired::Cells;
-use crate::{Failure, Row, Table, TablePlan, wilson95};
+use crate::{Failure, Row, Table, TablePlan};
 
 mod csv;
 mod markdown;

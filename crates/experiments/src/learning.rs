@@ -1,11 +1,9 @@
 //! What beliefs learn over an episode: errors by step, over the trials of an arm.
 
-use std::fmt::Write as _;
-
 use agent::BeliefErrors;
 
-use crate::TrialRecord;
 use crate::combined::{Arm, Part};
+use crate::{TrialRecord, spreadsheet};
 
 /// An error of the belief.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,14 +61,9 @@ pub(crate) struct Spread {
 impl Spread {
     /// By linear interpolation between order statistics; `None` without values.
     pub(crate) fn of(mut values: Vec<f64>) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
-        let quantile = |share: f64| {
-            let at = share * (values.len() - 1) as f64;
-            let (below, above) = (at.floor() as usize, at.ceil() as usize);
-            values[below] + (at - at.floor()) * (values[above] - values[below])
-        };
-        let spread = || Self { count: values.len(), low: quantile(0.25), median: quantile(0.5), high: quantile(0.75) };
-        (!values.is_empty()).then(spread)
+        let mut quantile = |level| statistics::quantile(&mut values, level);
+        let (low, median, high) = (quantile(0.25)?, quantile(0.5)?, quantile(0.75)?);
+        Some(Self { count: values.len(), low, median, high })
     }
 }
 
@@ -113,30 +106,27 @@ pub(crate) fn curves(parts: &[Part]) -> Vec<Curve> {
 
 /// Curves for spreadsheets: a line a step and arm, three columns a quantity.
 pub(crate) fn to_csv(curves: &[Curve]) -> String {
-    let mut text = String::from("domain,run,method,actions,trials");
+    let mut header = ["domain", "run", "method", "actions", "trials"].map(String::from).to_vec();
     for quantity in Quantity::ALL {
-        let name = quantity.name();
-        // Writing to a string cannot fail.
-        let _ = write!(text, ",{name}_quartile1,{name}_median,{name}_quartile3");
+        header.extend(["quartile1", "median", "quartile3"].map(|part| format!("{}_{part}", quantity.name())));
     }
-    text.push('\n');
-    for of_arm in curves.chunk_by(|a, b| a.arm == b.arm && a.domain == b.domain) {
-        let first = &of_arm[0];
-        for step in 0..first.steps.len() {
-            let trials = first.steps[step].map_or(0, |spread| spread.count);
-            let _ = write!(text, "{},{},{},{step},{trials}", first.domain, first.arm.run, first.arm.method.name());
-            for curve in of_arm {
-                match curve.steps[step] {
-                    Some(Spread { low, median, high, .. }) => {
-                        let _ = write!(text, ",{low:.4},{median:.4},{high:.4}");
-                    }
-                    None => text.push_str(",,,"),
-                }
-            }
-            text.push('\n');
-        }
+    let of_arms = curves.chunk_by(|a, b| a.arm == b.arm && a.domain == b.domain);
+    let rows = of_arms.flat_map(|of_arm| (0..of_arm[0].steps.len()).map(move |step| row(of_arm, step)));
+    spreadsheet::to_csv(&header, rows)
+}
+
+/// What all curves of an arm say of a step.
+fn row(of_arm: &[Curve], step: usize) -> Vec<String> {
+    let first = &of_arm[0];
+    let trials = first.steps[step].map_or(0, |spread| spread.count);
+    let Arm { run, method } = &first.arm;
+    let mut row = vec![first.domain.clone(), run.clone(), method.name().into(), step.to_string(), trials.to_string()];
+    for curve in of_arm {
+        let cells =
+            curve.steps[step].map(|Spread { low, median, high, .. }| [low, median, high].map(|v| format!("{v:.4}")));
+        row.extend(cells.unwrap_or_default());
     }
-    text
+    row
 }
 
 #[cfg(test)]

@@ -6,14 +6,6 @@
 //!
 //! An [`Evaluation`] is one run, a [`Player`] plays what it lacks, a [`Suite`] is all runs of a [`Plan`] and puts them side by side
 //! ([`Combined`]). What depends on the clock stands at the end of a trial's line and in files of its own.
-//!
-//! # Example
-//!
-//! ```
-//! // 24 of 30: what the rate may be (Wilson, 95 %).
-//! let [low, high] = experiments::wilson95(24, 30);
-//! assert!((low - 0.627).abs() < 5e-4 && (high - 0.905).abs() < 5e-4);
-//! ```
 
 mod archive;
 mod clock;
@@ -22,7 +14,6 @@ mod error;
 mod evaluation;
 mod failure;
 mod files;
-mod interval;
 mod learning;
 mod log;
 mod pace;
@@ -32,6 +23,7 @@ mod plan;
 mod player;
 mod run;
 mod shards;
+mod spreadsheet;
 mod suite;
 mod table;
 mod trial;
@@ -42,7 +34,6 @@ pub use combined::{Arm, Combined, CombinedRow, Common, Comparison, Source, Sourc
 pub use error::Error;
 pub use evaluation::{Evaluation, Request};
 pub use failure::{Failure, world_failures};
-pub use interval::wilson95;
 pub use pace::Pace;
 pub use paired::Pair;
 pub use plan::{Include, Item, Plan, Pool, RunPlan, TablePlan};

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::TrialRecord;
 use crate::combined::Part;
+use crate::spreadsheet;
 
 /// Times of a run's method.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,14 +65,15 @@ pub(crate) fn to_markdown(paces: &[Pace]) -> String {
 
 /// For spreadsheets.
 pub(crate) fn to_csv(paces: &[Pace]) -> String {
-    let mut text =
-        String::from("folder,method,decisions,mean_decision_seconds,slowest_decision_seconds,mean_trial_seconds\n");
-    for pace in paces {
+    let header =
+        ["folder", "method", "decisions", "mean_decision_seconds", "slowest_decision_seconds", "mean_trial_seconds"];
+    let row = |pace: &Pace| {
         let times = [pace.mean_decision_seconds, pace.slowest_decision_seconds, pace.mean_trial_seconds];
-        let times = times.map(|secs| secs.to_string()).join(",");
-        let _ = writeln!(text, "{},{},{},{times}", pace.folder, pace.method.name(), pace.decisions);
-    }
-    text
+        let mut row = vec![pace.folder.clone(), pace.method.name().into(), pace.decisions.to_string()];
+        row.extend(times.map(|secs| secs.to_string()));
+        row
+    };
+    spreadsheet::to_csv(&header, paces.iter().map(row))
 }
 
 #[cfg(test)]

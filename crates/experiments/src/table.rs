@@ -6,9 +6,10 @@ use std::fmt::Write as _;
 use agent::{Method, Reason};
 use scenario::Published;
 use serde::{Deserialize, Serialize};
+use statistics::wilson95;
 
 use crate::paired::{Pair, pairs, probability};
-use crate::{Failure, Provenance, TrialRecord, wilson95};
+use crate::{Failure, Provenance, TrialRecord, spreadsheet};
 
 /// A method's row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -169,36 +170,54 @@ impl Table {
     /// For spreadsheets.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut text = String::from(
-            "domain,robot,preset,method,successes,trials,interval95_low,interval95_high,published_successes,published_trials,\
-             mean_return,mean_steps_to_goal,mean_depletions,transitions_per_action,with_obstacle,obstacle_touched,mean_large_forces,\
-             mean_out_of_reach\n",
-        );
-        for row in &self.rows {
-            let published = row.published.map_or(",".into(), |p| format!("{},{}", p.successes, p.trials));
-            let steps = row.mean_steps_to_goal.map_or(String::new(), |s| s.to_string());
-            let _ = writeln!(
-                text,
-                "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
-                row.domain,
-                row.robot,
-                row.preset,
-                row.method.name(),
-                row.successes,
-                row.trials,
-                row.interval95[0],
-                row.interval95[1],
-                published,
-                row.mean_return,
-                steps,
-                row.mean_depletions,
-                row.transitions_per_action,
-                row.with_obstacle,
-                row.obstacle_touched,
-                row.mean_large_forces,
-                row.mean_out_of_reach,
-            );
-        }
-        text
+        let header = [
+            "domain",
+            "robot",
+            "preset",
+            "method",
+            "successes",
+            "trials",
+            "interval95_low",
+            "interval95_high",
+            "published_successes",
+            "published_trials",
+            "mean_return",
+            "mean_steps_to_goal",
+            "mean_depletions",
+            "transitions_per_action",
+            "with_obstacle",
+            "obstacle_touched",
+            "mean_large_forces",
+            "mean_out_of_reach",
+        ];
+        let row = |row: &Row| {
+            let [successes, trials] = published_cells(row.published);
+            vec![
+                row.domain.clone(),
+                row.robot.clone(),
+                row.preset.clone(),
+                row.method.name().into(),
+                row.successes.to_string(),
+                row.trials.to_string(),
+                row.interval95[0].to_string(),
+                row.interval95[1].to_string(),
+                successes,
+                trials,
+                row.mean_return.to_string(),
+                row.mean_steps_to_goal.map_or(String::new(), |steps| steps.to_string()),
+                row.mean_depletions.to_string(),
+                row.transitions_per_action.to_string(),
+                row.with_obstacle.to_string(),
+                row.obstacle_touched.to_string(),
+                row.mean_large_forces.to_string(),
+                row.mean_out_of_reach.to_string(),
+            ]
+        };
+        spreadsheet::to_csv(&header, self.rows.iter().map(row))
     }
+}
+
+/// Successes and trials of a published result; empty where there is none.
+pub(crate) fn published_cells(published: Option<Published>) -> [String; 2] {
+    published.map_or_else(Default::default, |p| [p.successes.to_string(), p.trials.to_string()])
 }

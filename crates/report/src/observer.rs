@@ -149,24 +149,15 @@ fn parameter_of(
 ) -> SeenParameter {
     let mut values: Vec<(f64, f64)> = belief.iter().map(|(p, weight)| (value(p), weight)).collect();
     values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let quantile = |level| statistics::weighted_quantile(&values, level).unwrap_or(f64::NAN);
     SeenParameter {
         name: name.into(),
         unit: unit.into(),
-        low: quantile(&values, 0.05),
-        median: quantile(&values, 0.5),
-        high: quantile(&values, 0.95),
+        low: quantile(0.05),
+        median: quantile(0.5),
+        high: quantile(0.95),
         truth: truth.map(value),
     }
-}
-
-/// The first of the sorted values below which, and with which, at least a share of the weight lies.
-fn quantile(sorted: &[(f64, f64)], share: f64) -> f64 {
-    let mut sum = 0.0;
-    let found = sorted.iter().find(|(_, weight)| {
-        sum += weight;
-        sum >= share - 1e-12
-    });
-    found.or(sorted.last()).map_or(f64::NAN, |(value, _)| *value)
 }
 
 /// Particles at equal steps of the cumulative weight: without chance, so that equal beliefs look equal.
@@ -184,15 +175,4 @@ fn drawn(belief: &Particles<Particle>) -> Vec<&Particle> {
         drawn.extend(current);
     }
     drawn
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn quantiles_go_by_weight() {
-        let values = [(1.0, 0.1), (2.0, 0.5), (3.0, 0.4)];
-        assert_eq!([0.05, 0.1, 0.5, 0.7, 1.0].map(|share| quantile(&values, share)), [1.0, 1.0, 2.0, 3.0, 3.0]);
-    }
 }
