@@ -6,6 +6,26 @@ use end_to_end::{files, root, run, stderr};
 
 use crate::pipeline::trained;
 
+/// Words of decoders and of Rust, which say nothing to who writes a file.
+const RUST: [&str; 16] = [
+    "usize",
+    "u32",
+    "u64",
+    "i64",
+    "f64",
+    "custom:",
+    "missing field",
+    "unknown field",
+    "unknown variant",
+    "invalid type",
+    "invalid length",
+    "struct ",
+    "untagged",
+    "Some(",
+    "None",
+    "visitor",
+];
+
 /// Runs, expects exit code 2 and one line that holds all `parts`.
 pub(crate) fn refused(binary: &str, arguments: &str, parts: &[&str]) {
     let output = run(binary, arguments);
@@ -14,6 +34,9 @@ pub(crate) fn refused(binary: &str, arguments: &str, parts: &[&str]) {
     assert_eq!(message.trim().lines().count(), 1, "{binary} {arguments}: {message}");
     for part in parts {
         assert!(message.contains(part), "{binary} {arguments}: expected `{part}` in: {message}");
+    }
+    for word in RUST {
+        assert!(!message.contains(word), "{binary} {arguments}: `{word}` in: {message}");
     }
     assert!(output.stdout.is_empty(), "{binary} {arguments}");
 }
@@ -66,6 +89,53 @@ fn bad_scenarios_are_refused_and_nothing_is_written() {
     assert!(output.status.code() == Some(2) && message.contains("`a b [31m`"), "{message:?}");
     assert!(message.trim().lines().count() == 1 && !message.contains('\x1b'), "{message:?}");
     assert!(!out.exists(), "a refused run leaves nothing behind");
+}
+
+#[test]
+fn what_is_wrong_in_a_file_is_said_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let check = |rest: &str| format!("check D4 {rest}");
+    let scenarios: [(&str, &[&str]); 8] = [
+        ("--set task.horizon=far", &["`task.horizon`", "expected a whole number, 0 or more, found the text \"far\""]),
+        ("--set task.horizon=2.5", &["expected a whole number, 0 or more, found 2.5"]),
+        ("--set task.discount=true", &["`task.discount`", "expected a number, found true"]),
+        ("--set task.tool_start_m=[0.1,0.2]", &["`task.tool_start_m`", "expected a list of 3, found 2"]),
+        ("--set task=3", &["`task`", "expected a table, found 3"]),
+        ("--set task.goal.radius_cm=4", &["there is no key `radius_cm`", "nearest is `radius_m`"]),
+        ("--set belief.filter=best", &["`belief.filter`", "there is no choice `best`"]),
+        ("--set effects.model=[{table_tilt={slope_x_rad=0.0}}]", &["`slope_y_rad` is missing"]),
+    ];
+    for (arguments, parts) in scenarios {
+        refused("scenario", &check(arguments), parts);
+    }
+    let urdf = folder.path().join("arm.urdf");
+    let robots: [(&str, &[&str]); 4] = [
+        ("<mujoco model='arm'/>", &["arm.urdf", "expected a URDF file", "MJCF"]),
+        ("<sdf version='1.7'/>", &["arm.urdf", "SDF"]),
+        ("<robot name='r'><xacro:arm/></robot>", &["arm.urdf", "xacro"]),
+        ("<robot name='r'><link name='base'/></robot>", &["no such joint in", "which has none at all"]),
+    ];
+    for (text, parts) in robots {
+        std::fs::write(&urdf, text).unwrap();
+        refused("scenario", &check(&format!("--set robot.urdf={}", urdf.display())), parts);
+    }
+    let log = folder.path().join("log");
+    copy(&root().join("tests/data/mujoco-logs/logs/set-003"), &log);
+    let header = std::fs::read_to_string(log.join("log.toml")).unwrap();
+    let period = header.lines().find(|line| line.starts_with("period_secs")).unwrap();
+    let headers: [(&str, &[&str]); 3] = [
+        ("", &["log.toml", "`period_secs` is missing"]),
+        ("period_secs = \"fast\"", &["log.toml", "`period_secs`", "expected a number, found the text \"fast\""]),
+        ("period_secs = 0.02\nperiod_s = 0.02", &["log.toml", "there is no key `period_s`"]),
+    ];
+    for (line, parts) in headers {
+        std::fs::write(log.join("log.toml"), header.replace(period, line)).unwrap();
+        refused(
+            "diagnose",
+            &format!("--measured {} --out {}", log.display(), folder.path().join("out").display()),
+            parts,
+        );
+    }
 }
 
 #[test]
@@ -136,6 +206,18 @@ fn a_run_folder_of_another_run_is_refused_and_left_alone() {
     }
     refused("report", &format!("{out} --out {out}/trials.jsonl"), &["trials.jsonl", "not a page of this program"]);
     assert!(files(folder.path()) == before);
+    // Files of somebody else, by the names of results.
+    let mine = tempfile::tempdir().unwrap();
+    for (binary, file, arguments) in [
+        ("demo", "episode.html", "--quick --method heuristic"),
+        ("diagnose", "model.toml", "--measured tests/data/mujoco-logs/logs/set-003"),
+        ("record-log", "model.toml", "--actions passive"),
+    ] {
+        std::fs::write(mine.path().join(file), "mine").unwrap();
+        refused(binary, &format!("{arguments} --out {}", mine.path().display()), &[file]);
+        assert_eq!(files(mine.path()).len(), 1, "{binary}");
+        std::fs::remove_file(mine.path().join(file)).unwrap();
+    }
     // A page is replaced by a newer one.
     for _ in 0..2 {
         assert!(run("report", &out.to_string()).status.success());

@@ -71,6 +71,18 @@ fn results(folder: &Path) -> Vec<(PathBuf, String)> {
 }
 
 #[test]
+fn an_episode_of_demo_is_the_same_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let play = |threads: &str| {
+        let out = folder.path().join(threads);
+        let trees = "--set planner.trees=3";
+        succeed("demo", &format!("--domain D4 --quick {trees} --threads {threads} --out {}", out.display()));
+        files(&out)
+    };
+    assert!(play("1") == play("3"));
+}
+
+#[test]
 fn a_dataset_is_the_same_for_one_thread_and_two_and_after_a_kill() {
     let expected = files(&trained().data);
     assert!(expected.len() >= 12, "plan, manifest and ten shards");

@@ -81,7 +81,8 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let log = measured_log::read(measured)?;
     let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
     let owner = folder::owner(measured);
-    let out = arguments.out.clone().unwrap_or_else(|| folder::default(measured, &owner, &FILES));
+    let default = || folder::default(Path::new("runs/diagnose"), measured, &owner, &FILES);
+    let out = arguments.out.clone().unwrap_or_else(default);
     let begun = match &arguments.model {
         Some(path) => Some(begin_with(path, &out, &mut nominal)?),
         None => None,

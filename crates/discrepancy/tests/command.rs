@@ -33,6 +33,14 @@ fn the_report_keeps_its_contract() {
     let output = diagnose(&root().join("tests/data/mujoco-logs/logs/set-003"), &out);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    // How far it is stands on standard error.
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    for stage in ["re-tuning", "screening", "fitting", "comparing"] {
+        assert!(
+            said.lines().any(|line| line.starts_with(stage) && line.contains("simulated episodes")),
+            "{stage}: {said}"
+        );
+    }
     let written: Value = serde_json::from_str(&std::fs::read_to_string(out.join("report.json")).unwrap()).unwrap();
     assert_eq!(report, written);
     assert_eq!(report["verdict"], "effect");
