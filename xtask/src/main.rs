@@ -39,7 +39,7 @@ enum Verb {
     /// Makes a page of a run, of all tables, or of an episode.
     #[command(disable_help_flag = true)]
     Report(Rest),
-    /// Makes a recording of an episode for the Rerun viewer; its first build takes a quarter of an hour.
+    /// Makes a recording of an episode for the Rerun viewer; its first build takes long.
     #[command(disable_help_flag = true)]
     Rerun(Rest),
     /// Turns published measurements into a log that can be diagnosed.

@@ -85,7 +85,8 @@ impl Owner {
                 let of = if subject.is_empty() { String::new() } else { format!(" for {subject}") };
                 refuse(crate::one_line(&format!("it holds results of {program}{of}"), 400))
             }
-            Err(_) => match files.iter().find(|file| std::fs::symlink_metadata(folder.join(file)).is_ok()) {
+            // A folder of that name cannot be written over: that is another complaint.
+            Err(_) => match files.iter().find(|file| is_there(&folder.join(file))) {
                 Some(file) => refuse(format!("it holds {file}, which {} did not write", self.program)),
                 None => Ok(()),
             },
@@ -104,6 +105,11 @@ impl Owner {
     fn text(&self) -> String {
         format!("{}\n{}\n", self.program, crate::one_line(&self.subject, 4000))
     }
+}
+
+/// Whether something that is no folder is there, a link to nothing among it.
+fn is_there(path: &Path) -> bool {
+    std::fs::symlink_metadata(path).is_ok_and(|there| !there.is_dir())
 }
 
 #[cfg(test)]
