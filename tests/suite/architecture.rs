@@ -121,7 +121,7 @@ fn programs_print_where_a_closed_pipe_is_no_panic() {
         let program = path.iter().any(|folder| folder == "src");
         if program {
             let found = ["println!(", "print!("].iter().find(|name| text.contains(*name));
-            assert!(found.is_none(), "{}: {found:?} instead of whole_file::out! or say!", path.display());
+            assert!(found.is_none(), "{}: {found:?} instead of program::out! or say!", path.display());
             read += 1;
         }
     }

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 
-use crate::program::{cargo, root};
+use crate::built::{cargo, root};
 
 /// What to check.
 #[derive(Debug, clap::Args)]
@@ -25,7 +25,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
         steps.push(&["check", "--release", "--package", "recording", "--features", "rerun", "--all-targets"]);
     }
     for step in steps {
-        whole_file::say!("cargo {}", step.join(" "));
+        program::say!("cargo {}", step.join(" "));
         if !cargo(&root).args(step).status().context("cannot run cargo")?.success() {
             return Ok(ExitCode::FAILURE);
         }

@@ -9,7 +9,7 @@ use anyhow::Result;
 use clap::{Command, CommandFactory as _};
 use clap_complete::Shell;
 
-use crate::program::{VIEWER, path};
+use crate::built::{VIEWER, path};
 
 /// Name that shells complete.
 const NAME: &str = "xtask";
@@ -68,7 +68,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
     let (mut menu, mut missing) = menu(|verb| path(if verb == "rerun" { VIEWER } else { verb }));
     missing.retain(|verb| verb != "rerun");
     if !missing.is_empty() {
-        whole_file::say!("not built, so without their options: {}", missing.join(", "));
+        program::say!("not built, so without their options: {}", missing.join(", "));
     }
     let mut script = Vec::new();
     clap_complete::generate(options.shell, &mut menu, NAME, &mut script);
@@ -78,7 +78,7 @@ pub(crate) fn run(options: &Options) -> Result<ExitCode> {
         _ => "",
     };
     script.extend(more.as_bytes());
-    whole_file::show(&String::from_utf8_lossy(&script));
+    program::show(&String::from_utf8_lossy(&script));
     Ok(ExitCode::SUCCESS)
 }
 

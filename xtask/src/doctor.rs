@@ -80,16 +80,16 @@ impl Check {
 }
 
 pub(crate) fn run(options: &Options) -> Result<ExitCode> {
-    let root = crate::program::root();
+    let root = crate::built::root();
     let mut checks = tools::toolchain();
     checks.extend(machine::checks(&root));
     checks.extend(priors::checks(&root));
     checks.extend(tools::optional(&root, &options.python));
     let good = checks.iter().all(|check| check.state == State::Ok || !check.required);
-    whole_file::show(&if options.json { as_json(&checks, good) } else { as_text(&checks) });
+    program::show(&if options.json { as_json(&checks, good) } else { as_text(&checks) });
     if good && !options.json {
         let demo = ["cargo", "xtask", "demo"].map(String::from).to_vec();
-        whole_file::next(&[(demo, "builds what it needs, in minutes, and plays one episode")]);
+        program::next(&[(demo, "builds what it needs, in minutes, and plays one episode")]);
     }
     Ok(if good { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

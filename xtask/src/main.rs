@@ -1,15 +1,15 @@
 //! The menu: one verb, one release program. It builds what it runs, and never links it.
 
+mod built;
 mod ci;
 mod completions;
 mod doctor;
 mod groups;
-mod program;
 
 use std::process::ExitCode;
 
+use built::{become_program, become_viewer};
 use clap::{FromArgMatches as _, Parser, Subcommand};
-use program::{become_program, become_viewer};
 
 /// Commands of the project.
 #[derive(Debug, Parser)]
@@ -81,7 +81,7 @@ fn main() -> ExitCode {
     let chosen = Menu::from_arg_matches(&menu.get_matches_mut()).unwrap_or_else(|error| error.exit());
     let Some(verb) = chosen.verb else {
         // Who asks for nothing wants to see what there is.
-        whole_file::show(&menu.render_help().to_string());
+        program::show(&menu.render_help().to_string());
         return ExitCode::SUCCESS;
     };
     let result = match verb {
@@ -103,7 +103,7 @@ fn main() -> ExitCode {
         Verb::Ci(options) => ci::run(&options),
     };
     result.unwrap_or_else(|error| {
-        whole_file::complain(&error);
+        program::complain(&error);
         ExitCode::FAILURE
     })
 }

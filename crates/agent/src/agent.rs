@@ -66,7 +66,7 @@ impl<'a> Agent<'a> {
             Err(Error::World(error)) => End::WorldFailed(error),
             played => played?,
         };
-        Ok(log.finish(end, self.problem.scenario.task.discount))
+        Ok(log.finish(&end, self.problem.scenario.task.discount))
     }
 
     /// Algorithm 1 of Hayashi et al. (ICRA 2019). The numbers are the lines of the paper's listing, and the words are the paper's.

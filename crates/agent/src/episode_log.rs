@@ -68,7 +68,7 @@ impl<'a> EpisodeLog<'a> {
     }
 
     /// The episode, which ended so.
-    pub(crate) fn finish(self, end: End, discount: f64) -> Episode {
+    pub(crate) fn finish(self, end: &End, discount: f64) -> Episode {
         let Self { steps, belief_errors, depletions, .. } = self;
         Episode {
             reason: end.reason(),

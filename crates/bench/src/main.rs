@@ -105,28 +105,19 @@ Examples:
   cargo xtask bench accuracy";
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(2)
-        }
-    }
+    program::finish(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => scenario::find_root(&std::env::current_dir().context("current folder")?)?,
-    };
+    let root = scenario::project_root(arguments.root.as_deref())?;
     match &arguments.what {
         What::Physics { rounds, actions, json } => {
             let effort = Effort { rounds: *rounds as usize, actions: *actions as usize };
-            let result = physics::run(&root, effort, |text| whole_file::say!("{text}"))?;
+            let result = physics::run(&root, effort, |text| program::say!("{text}"))?;
             if *json {
-                whole_file::out!("{result}");
+                program::out!("{result}");
             } else {
-                whole_file::show(&table(&result));
+                program::show(&table(&result));
             }
         }
         What::Belief { domain, episodes, seed, quick, set } => {
@@ -137,27 +128,27 @@ fn run(arguments: &Arguments) -> Result<()> {
                 quick: *quick,
                 set: set.clone(),
             };
-            let result = belief::run(&root, &task, |text| whole_file::say!("{text}"))?;
-            whole_file::out!("{}", serde_json::to_string_pretty(&result)?);
+            let result = belief::run(&root, &task, |text| program::say!("{text}"))?;
+            program::out!("{}", serde_json::to_string_pretty(&result)?);
         }
         What::Planner { episodes, quick, json } => {
             let effort = planner::Effort { episodes: *episodes, quick: *quick };
-            let result = planner::run(effort, |text| whole_file::say!("{text}"))?;
+            let result = planner::run(effort, |text| program::say!("{text}"))?;
             if *json {
-                whole_file::out!("{result}");
+                program::out!("{result}");
             } else {
-                whole_file::show(&planner::table(&result));
+                program::show(&planner::table(&result));
             }
         }
         What::Prior { rounds, steps, data, compile, json } => {
             let made = ["runs/data/sawyer", "runs/quick/data/sawyer"].map(|folder| root.join(folder));
             let data = data.clone().or_else(|| made.into_iter().find(|folder| folder.join("meta/info.json").is_file()));
             let effort = prior::Effort { rounds: *rounds as usize, steps: *steps as usize, data, compile: *compile };
-            let result = prior::run(&root, &effort, |text| whole_file::say!("{text}"))?;
+            let result = prior::run(&root, &effort, |text| program::say!("{text}"))?;
             if *json {
-                whole_file::out!("{result}");
+                program::out!("{result}");
             } else {
-                whole_file::show(&prior::table(&result));
+                program::show(&prior::table(&result));
             }
         }
         What::Accuracy { write, set } => {
@@ -167,7 +158,7 @@ fn run(arguments: &Arguments) -> Result<()> {
                 let path = root.join(report::PAGE);
                 std::fs::write(&path, &page).with_context(|| path.display().to_string())?;
             } else {
-                whole_file::show(&page);
+                program::show(&page);
             }
         }
     }

@@ -23,7 +23,8 @@
 //! engine.check()?;
 //! let array = cluster::Array { engine, label: "datagen", folder, processors: 1 };
 //! let missing = || Ok((0..20).filter(|shard| !folder.join(format!("{shard}.parquet")).exists()).collect());
-//! let outcome = array.run(missing, &AtomicBool::new(false), &mut |event| whole_file::out!("{event}"))?;
+//! let mut events = Vec::new();
+//! let outcome = array.run(missing, &AtomicBool::new(false), &mut |event| events.push(event))?;
 //! assert_eq!(outcome, cluster::Outcome::Finished);
 //! # Ok(())
 //! # }

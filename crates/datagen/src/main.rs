@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -12,9 +11,9 @@ use cluster::{Array, Engine, Event, Executor, Lock, Outcome};
 use datagen::Generator;
 use dataset::{Plan, ShardInfo, ShardState};
 use indicatif::{ProgressBar, ProgressStyle};
+use program::{Failed, typed};
 use rayon::prelude::*;
 use scenario::Selection;
-use whole_file::typed;
 
 /// Generates training data: randomised worlds, heuristic policy, recorded transitions.
 #[derive(Debug, Parser)]
@@ -67,31 +66,11 @@ Examples:
   cargo xtask datagen --robot jaco --transitions 4000 --shards 4 --out runs/data/jaco-small";
 
 /// What went wrong after the input was found to be good.
-#[derive(Debug)]
-struct Failed;
-
-impl std::fmt::Display for Failed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("the run stopped, finished shards are kept")
-    }
-}
+const FAILED: Failed = Failed::new("the run stopped, finished shards are kept");
 
 fn main() -> ExitCode {
-    // Silent unless RUST_LOG asks: results go to files, progress to the bar.
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "off".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => {
-            whole_file::say!("interrupted: finished shards are kept, run the same command again to go on");
-            ExitCode::from(130)
-        }
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
-        }
-    }
+    program::log_on_request();
+    program::resumable("shards", run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
@@ -111,11 +90,9 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let missing = job.missing_shards()?;
     let resumed = job.plan.shards as usize - missing.len();
     if resumed > 0 {
-        whole_file::say!("{resumed} of {} shards are finished already", job.plan.shards);
+        program::say!("{resumed} of {} shards are finished already", job.plan.shards);
     }
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
+    let interrupted = program::interrupts()?;
     let bar = progress(missing.len() as u64 * job.plan.episodes_per_shard, "episodes");
     #[expect(clippy::disallowed_methods, reason = "a program may measure its rate")]
     let started = std::time::Instant::now();
@@ -127,7 +104,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     if interrupted.load(Ordering::Relaxed) {
         return Ok(false);
     }
-    let manifest = job.finish().context(Failed)?;
+    let manifest = job.finish().context(FAILED)?;
     job.print(&manifest, &missing, started.elapsed().as_secs_f64(), arguments.json);
     if !arguments.json {
         suggest_train(&job, arguments.quick);
@@ -140,7 +117,7 @@ fn suggest_train(job: &Job, quick: bool) {
     let mut train: Vec<String> =
         ["cargo", "xtask", "train", "--robot", &job.robot, "--data", &typed(&job.out)].map(String::from).to_vec();
     train.extend(quick.then(|| "--quick".into()));
-    whole_file::next(&[(train, "trains the prior on it")]);
+    program::next(&[(train, "trains the prior on it")]);
 }
 
 /// A dataset to be made.
@@ -155,10 +132,7 @@ struct Job {
 impl Job {
     /// Checks the input and writes nothing: a faulty arm must not leave a plan behind.
     fn new(arguments: &Arguments) -> Result<Self> {
-        let root = match &arguments.root {
-            Some(root) => root.clone(),
-            None => scenario::find_root(&std::env::current_dir()?)?,
-        };
+        let root = scenario::project_root(arguments.root.as_deref())?;
         let scenario = Selection {
             robot: arguments.robot.clone(),
             domain: arguments.scenario.clone(),
@@ -201,9 +175,9 @@ impl Job {
     /// What a task of an array does.
     fn worker(&self, shard: u32) -> Result<()> {
         if !matches!(dataset::shard_state(&self.out, shard, &self.hash)?, ShardState::Finished(_)) {
-            self.make(shard).context(Failed)?;
+            self.make(shard).context(FAILED)?;
         }
-        whole_file::say!("shard {shard} is finished");
+        program::say!("shard {shard} is finished");
         Ok(())
     }
 
@@ -216,12 +190,12 @@ impl Job {
             let info = self.make(index)?;
             bar.inc(self.plan.episodes_per_shard);
             if bar.is_hidden() {
-                whole_file::say!("shard {index}: {} transitions", info.rows - info.episodes);
+                program::say!("shard {index}: {} transitions", info.rows - info.episodes);
             }
             Ok(())
         };
         let results: Vec<Result<()>> = pool.install(|| missing.par_iter().map(make).collect());
-        results.into_iter().collect::<Result<Vec<()>>>().context(Failed)?;
+        results.into_iter().collect::<Result<Vec<()>>>().context(FAILED)?;
         Ok(())
     }
 
@@ -229,7 +203,7 @@ impl Job {
         let array = Array { engine, label: "datagen", folder: &self.out, processors: 1 };
         let there = |index: &&u32| self.out.join(dataset::shard_path(**index)).exists();
         let mut report = |event| match event {
-            Event::News(news) => bar.suspend(|| whole_file::say!("{news}")),
+            Event::News(news) => bar.suspend(|| program::say!("{news}")),
             Event::Looked => {
                 bar.set_position(missing.iter().filter(there).count() as u64 * self.plan.episodes_per_shard);
             }
@@ -237,7 +211,7 @@ impl Job {
         match array.run(|| self.missing_shards(), interrupted, &mut report) {
             Ok(Outcome::Finished | Outcome::Interrupted) => Ok(()),
             Err(error) if matches!(error.downcast_ref(), Some(cluster::Error::Unfinished { .. })) => {
-                Err(error.context(Failed))
+                Err(error.context(FAILED))
             }
             Err(error) => Err(error),
         }
@@ -282,10 +256,10 @@ impl Job {
                 "out": self.out, "robot": self.robot, "transitions": manifest.transitions, "episodes": manifest.episodes,
                 "counts": manifest.counts, "seconds": seconds, "transitions_per_second": rate,
             });
-            whole_file::out!("{summary}");
+            program::out!("{summary}");
             return;
         }
-        whole_file::out!(
+        program::out!(
             "{}: {} transitions in {} episodes, {} shards; {}; {:.1} s, {:.0} transitions/s",
             self.out.display(),
             manifest.transitions,

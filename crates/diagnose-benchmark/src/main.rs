@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -15,6 +14,7 @@ use diagnose_benchmark::score::{Score, score};
 use diagnose_benchmark::table::{Table, sets_to_csv};
 use indicatif::{ProgressBar, ProgressStyle};
 use physics_model::EffectKind;
+use program::Failed;
 use rayon::prelude::*;
 use whole_file::Existing;
 
@@ -72,30 +72,13 @@ Examples:
   cargo xtask diagnose-benchmark --sets 4 --none 2 --unknown 2 --pairs 0 --arms 0 --out runs/diagnose-benchmark/small --score-only";
 
 /// What went wrong after the input was found to be good.
-#[derive(Debug)]
-struct Failed;
-
-impl std::fmt::Display for Failed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("the benchmark stopped, finished sets are kept")
-    }
-}
+const FAILED: Failed = Failed::new("the benchmark stopped, finished sets are kept");
 
 /// Scores between two lines that say how many there are.
 const SCORES_A_LINE: usize = 50;
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => {
-            whole_file::say!("interrupted: finished sets are kept, run the same command again to go on");
-            ExitCode::from(130)
-        }
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
-        }
-    }
+    program::resumable("sets", run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
@@ -122,9 +105,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let identity = Identity { options: options.clone(), project: env!("CARGO_PKG_VERSION").into(), solver };
     let folder = Folder::open(&arguments.out, &identity, arguments.score_only)?;
     let plan = Plan::new(options);
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
+    let interrupted = program::interrupts()?;
     let threads = arguments.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads")?;
     let arms = arguments.root.as_deref();
@@ -132,24 +113,24 @@ fn run(arguments: &Arguments) -> Result<bool> {
         return Ok(false);
     }
     let scored = AtomicUsize::new(0);
-    whole_file::say!("scoring {} sets", plan.len());
+    program::say!("scoring {} sets", plan.len());
     let one = |set| {
         let result = score(&folder, set, arms, arguments.baselines);
         let done = 1 + scored.fetch_add(1, Ordering::Relaxed);
         // With the baselines it takes a while, too.
         if done.is_multiple_of(SCORES_A_LINE) {
-            whole_file::say!("{done} of {} sets are scored", plan.len());
+            program::say!("{done} of {} sets are scored", plan.len());
         }
         result
     };
     let results: Vec<Result<Option<Score>>> =
         pool.install(|| (0..plan.len()).into_par_iter().with_max_len(1).map(one).collect());
     let scores: Vec<Score> =
-        results.into_iter().filter_map(Result::transpose).collect::<Result<_>>().context(Failed)?;
+        results.into_iter().filter_map(Result::transpose).collect::<Result<_>>().context(FAILED)?;
     let table = Table::new(&scores, plan.len() - scores.len(), arguments.baselines);
-    write(&folder, &table, &scores).context(Failed)?;
-    whole_file::show(&format!("{}\n{}", table.to_markdown(), table.confusion_to_markdown()));
-    whole_file::say!("written to {}: table.md, confusion.md, sets.csv", whole_file::typed(&arguments.out));
+    write(&folder, &table, &scores).context(FAILED)?;
+    program::show(&format!("{}\n{}", table.to_markdown(), table.confusion_to_markdown()));
+    program::say!("written to {}: table.md, confusion.md, sets.csv", program::typed(&arguments.out));
     Ok(true)
 }
 
@@ -165,7 +146,7 @@ fn answer(
     let missing: Vec<usize> =
         (0..plan.len()).filter(|set| !folder.is_answered(*set) || !folder.truth(*set).exists()).collect();
     if missing.len() < plan.len() {
-        whole_file::say!("{} sets are finished already", plan.len() - missing.len());
+        program::say!("{} sets are finished already", plan.len() - missing.len());
     }
     let bar = ProgressBar::new(missing.len() as u64);
     let style = "{bar:40} {pos}/{len} sets, {per_sec}, {eta} left {msg}";
@@ -178,14 +159,14 @@ fn answer(
         let done = folder.generate(plan, *set, arms).and_then(|()| folder.solve(diagnose, *set, arms));
         bar.inc(1);
         if bar.is_hidden() && done.is_ok() {
-            whole_file::say!("{}: answered, {} of {}", name(*set), bar.position(), missing.len());
+            program::say!("{}: answered, {} of {}", name(*set), bar.position(), missing.len());
         }
         if let Err(error) = done {
             // An interrupt ends the solvers too.
             if interrupted.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            bar.suspend(|| whole_file::say!("{}: {error:#}", name(*set)));
+            bar.suspend(|| program::say!("{}: {error:#}", name(*set)));
             return Err(error);
         }
         Ok(())
@@ -195,7 +176,7 @@ fn answer(
     if interrupted.load(Ordering::Relaxed) {
         return Ok(false);
     }
-    results.into_iter().collect::<Result<Vec<()>>>().context(Failed)?;
+    results.into_iter().collect::<Result<Vec<()>>>().context(FAILED)?;
     Ok(true)
 }
 

@@ -10,8 +10,9 @@ use discrepancy::{Error, ModelFile, Nominal, Report, Settings, Verdict, diagnose
 use measured_log::Robot;
 use physics_model::EffectConfig;
 use physics_model::robot::find_root;
+use program::typed;
 use serde::Deserialize;
-use whole_file::{Existing, typed};
+use whole_file::Existing;
 
 #[path = "program/bar.rs"]
 mod bar;
@@ -58,15 +59,13 @@ Examples:
   cargo xtask diagnose --measured tests/data/mujoco-logs/logs/set-003 --model runs/diagnose/first/model.toml --out runs/diagnose/again";
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            // 2 is bad input; a disk that refuses is a failure.
-            if let Error::Write { .. } | Error::Folder { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
-        }
-    }
+    // 2 is bad input; a disk that refuses is a failure.
+    program::end(
+        run(&Arguments::parse()),
+        |error| {
+            if let Error::Write { .. } | Error::Folder { .. } = error { 1 } else { 2 }
+        },
+    )
 }
 
 #[expect(clippy::disallowed_methods, reason = "the report says how long it took; nothing depends on it")]
@@ -109,7 +108,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
     }
     if arguments.json {
-        whole_file::show(&json);
+        program::show(&json);
     } else {
         print_summary(&report);
         suggest_next(arguments, measured, &report, &out, log.header.robot);
@@ -124,7 +123,7 @@ fn list_effects(json: bool) -> Result<(), Error> {
     } else {
         discrepancy::listing::text()
     };
-    whole_file::show(&text);
+    program::show(&text);
     Ok(())
 }
 
@@ -173,16 +172,16 @@ fn fold(text: &str) -> Result<[usize; 2], String> {
 }
 
 fn print_summary(report: &Report) {
-    whole_file::out!("{}", report.summary);
+    program::out!("{}", report.summary);
     if let Some(reason) = &report.reason {
-        whole_file::out!("  why unknown: {reason}");
+        program::out!("  why unknown: {reason}");
     }
     for effect in &report.effects {
-        whole_file::out!("  {} (confidence {:.2}): {}", effect.name, effect.confidence, effect.description);
+        program::out!("  {} (confidence {:.2}): {}", effect.name, effect.confidence, effect.description);
         for value in &effect.parameters {
             let [low, high] = value.interval90;
             let digits = decimals(value.interval90, value.value);
-            whole_file::out!(
+            program::out!(
                 "    {} = {:.digits$} {} (90 %: {low:.digits$} to {high:.digits$})",
                 value.key,
                 value.value,
@@ -192,27 +191,27 @@ fn print_summary(report: &Report) {
     }
     let names = report.confusion_set.join(", ");
     if report.effects.is_empty() && !names.is_empty() {
-        whole_file::out!("  the evidence favours {names}, but too little to name it");
+        program::out!("  the evidence favours {names}, but too little to name it");
     } else if report.confusion_set.len() > 1 {
-        whole_file::out!("  this log does not tell apart: {names}");
+        program::out!("  this log does not tell apart: {names}");
     }
     if let Some(description) = &report.description {
-        whole_file::out!("  what is left: {description}");
+        program::out!("  what is left: {description}");
     }
     for cell in report.located.iter().filter(|cell| cell.share > 0.0 && cell.stands_out()).take(3) {
         let (channel, phase) = (cell.channel.name(), cell.phase.name());
-        whole_file::out!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
+        program::out!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
     }
     if let Some(sentence) = report.left_out_sentence() {
-        whole_file::out!("  {sentence}");
+        program::out!("  {sentence}");
     }
-    whole_file::out!("  next experiment: {}", report.next_experiment);
-    whole_file::out!("{} simulated episodes, {:.0} s", report.rollouts, report.seconds);
+    program::out!("  next experiment: {}", report.next_experiment);
+    program::out!("{} simulated episodes, {:.0} s", report.rollouts, report.seconds);
 }
 
 /// What to do with the answer: look at it, ask what is left, plan with it.
 fn suggest_next(arguments: &Arguments, measured: &Path, report: &Report, out: &Path, robot: Robot) {
-    whole_file::say!("open {} in a browser: where, what, how sure", typed(&out.join("report.html")));
+    program::say!("open {} in a browser: where, what, how sure", typed(&out.join("report.html")));
     if report.verdict != Verdict::Effect {
         return;
     }
@@ -230,7 +229,7 @@ fn suggest_next(arguments: &Arguments, measured: &Path, report: &Report, out: &P
         plan.extend(["--model".into(), model, "--set".into(), truth]);
         commands.push((plan, "plans with it, in a simulated world that has it too"));
     }
-    whole_file::next(&commands);
+    program::next(&commands);
 }
 
 /// What every scenario begins with.

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -11,8 +10,8 @@ use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 use cluster::{Engine, Event, Executor, Outcome};
 use experiments::{Evaluation, Player, Request, Run, Shard, Suite, SuiteRequest};
+use program::{Failed, typed};
 use scenario::Selection;
-use whole_file::typed;
 
 /// Plays trials of methods on a domain, or all tables with --all, and prints the table.
 #[derive(Debug, Parser)]
@@ -107,38 +106,15 @@ Examples:
   cargo xtask eval --all --quick --only table1";
 
 /// What went wrong after the input was found to be good.
-#[derive(Debug)]
-struct Failed;
-
-impl std::fmt::Display for Failed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("the run stopped, finished trials are kept")
-    }
-}
+const FAILED: Failed = Failed::new("the run stopped, finished trials are kept");
 
 fn main() -> ExitCode {
-    // Silent unless RUST_LOG asks: results go to files, progress to the bar.
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "off".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => {
-            whole_file::say!("interrupted: finished trials are kept, run the same command again to go on");
-            ExitCode::from(130)
-        }
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
-        }
-    }
+    program::log_on_request();
+    program::resumable("trials", run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => scenario::find_root(&std::env::current_dir()?)?,
-    };
+    let root = scenario::project_root(arguments.root.as_deref())?;
     check_shards(arguments)?;
     match &arguments.domain {
         Some(domain) => run_one(arguments, &root, domain),
@@ -149,16 +125,16 @@ fn run(arguments: &Arguments) -> Result<bool> {
 fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     let evaluation = Evaluation::prepare(&request(arguments, root, domain))?;
     if let Some(folder) = evaluation.prior_folder() {
-        whole_file::say!("prior: {}", folder.display());
+        program::say!("prior: {}", folder.display());
     }
     let out = arguments.out.clone().unwrap_or_else(|| {
         root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(evaluation.name())
     });
     if let Some(index) = arguments.worker {
         let run = evaluation.open_worker(&out, Shard { index, of: arguments.shards })?;
-        let interrupted = listen_for_interrupts()?;
+        let interrupted = program::interrupts()?;
         let player = Player { threads: Some(arguments.threads.unwrap_or(1)), interrupted: &interrupted };
-        return player.play(&evaluation, &run).context(Failed);
+        return player.play(&evaluation, &run).context(FAILED);
     }
     if let Executor::Engine(engine) = arguments.executor {
         // Before anything is written: a machine without the engine must not leave a folder behind.
@@ -168,32 +144,32 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     if let (Some(_), None) = (&arguments.model, &arguments.world)
         && let Some(warning) = evaluation.scenario().truth_warning()
     {
-        whole_file::say!("{warning}");
+        program::say!("{warning}");
     }
     let run = evaluation.open(&out)?;
     if run.resumed() > 0 {
-        whole_file::say!("{} trials are finished already", run.resumed());
+        program::say!("{} trials are finished already", run.resumed());
     }
-    let interrupted = listen_for_interrupts()?;
+    let interrupted = program::interrupts()?;
     let finished = match arguments.executor {
         Executor::Local => {
             let player = Player { threads: arguments.threads, interrupted: &interrupted };
-            player.play(&evaluation, &run).context(Failed)?
+            player.play(&evaluation, &run).context(FAILED)?
         }
         Executor::Engine(engine) => submit(engine, &run, arguments, &interrupted)?,
     };
     if !finished {
         return Ok(false);
     }
-    let table = evaluation.finish(&run).context(Failed)?;
+    let table = evaluation.finish(&run).context(FAILED)?;
     if arguments.json {
-        whole_file::out!("{}", serde_json::to_string(&table)?);
+        program::out!("{}", serde_json::to_string(&table)?);
     } else {
-        whole_file::show(&table.to_markdown());
-        if let Some(sentence) = experiments::world_failures(run.trials().context(Failed)?.values()) {
-            whole_file::say!("{sentence}");
+        program::show(&table.to_markdown());
+        if let Some(sentence) = experiments::world_failures(run.trials().context(FAILED)?.values()) {
+            program::say!("{sentence}");
         }
-        whole_file::say!("written to {}", typed(&out));
+        program::say!("written to {}", typed(&out));
         suggest_report(&out);
     }
     Ok(true)
@@ -215,27 +191,27 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
         python: arguments.python.clone(),
         timeouts: timeouts(arguments),
     };
-    let mut note = |text: &str| whole_file::say!("{text}");
+    let mut note = |text: &str| program::say!("{text}");
     let suite = Suite::prepare(request, &mut note)?;
-    let interrupted = listen_for_interrupts()?;
+    let interrupted = program::interrupts()?;
     let player = Player { threads: arguments.threads, interrupted: &interrupted };
-    if !suite.play(&player, &mut note).context(Failed)? {
+    if !suite.play(&player, &mut note).context(FAILED)? {
         return Ok(false);
     }
-    let tables = suite.combine().context(Failed)?;
+    let tables = suite.combine().context(FAILED)?;
     if arguments.json {
-        whole_file::out!("{}", serde_json::to_string(&tables)?);
+        program::out!("{}", serde_json::to_string(&tables)?);
     } else {
         for table in &tables {
-            whole_file::out!("{}", table.to_markdown());
+            program::out!("{}", table.to_markdown());
         }
-        whole_file::say!("written to {}", typed(&out));
+        program::say!("written to {}", typed(&out));
         suggest_report(&out);
     }
     if arguments.publish {
         let to = root.join("assets/results");
-        suite.publish(&to).context(Failed)?;
-        whole_file::say!("published to {}", to.display());
+        suite.publish(&to).context(FAILED)?;
+        program::say!("published to {}", to.display());
     }
     Ok(true)
 }
@@ -243,7 +219,7 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
 /// What to do with a finished run.
 fn suggest_report(out: &Path) {
     let report = ["cargo".to_string(), "xtask".into(), "report".into(), typed(out)];
-    whole_file::next(&[(report.to_vec(), "makes a page of it: every trial, every failure")]);
+    program::next(&[(report.to_vec(), "makes a page of it: every trial, every failure")]);
 }
 
 fn timeouts(arguments: &Arguments) -> Timeouts {
@@ -288,11 +264,11 @@ fn check_shards(arguments: &Arguments) -> Result<()> {
 fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &AtomicBool) -> Result<bool> {
     let mut finished = run.resumed();
     let mut report = |event| match event {
-        Event::News(news) => whole_file::say!("{news}"),
+        Event::News(news) => program::say!("{news}"),
         Event::Looked => {
             let now = run.trials().map_or(finished, |trials| trials.len());
             if now > finished {
-                whole_file::say!("{now} trials are finished");
+                program::say!("{now} trials are finished");
             }
             finished = now;
         }
@@ -302,16 +278,8 @@ fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &Atomic
         Ok(outcome) => Ok(outcome == Outcome::Finished),
         // The rest is of the kind that is said before anything is played.
         Err(error @ experiments::Error::Cluster(cluster::Error::Refused { .. })) => Err(error.into()),
-        Err(error) => Err(error).context(Failed),
+        Err(error) => Err(error).context(FAILED),
     }
-}
-
-/// A flag that an interrupt sets.
-fn listen_for_interrupts() -> Result<Arc<AtomicBool>> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
-    Ok(interrupted)
 }
 
 /// A time-out on the command line.

@@ -72,12 +72,12 @@ fn report(bar: &ProgressBar, record: &TrialRecord) {
     if let Some(failure) = failure
         && !bar.is_hidden()
     {
-        bar.suspend(|| whole_file::say!("{} trial {trial}: {failure}", method.name()));
+        bar.suspend(|| program::say!("{} trial {trial}: {failure}", method.name()));
     }
     bar.inc(1);
     if bar.is_hidden() {
         let why = failure.as_ref().map_or_else(String::new, |failure| format!(" ({failure})"));
         let (method, reason) = (method.name(), reason.name());
-        whole_file::say!("{method} trial {trial}: {reason} after {steps} actions, {seconds:.1} s{why}");
+        program::say!("{method} trial {trial}: {reason} after {steps} actions, {seconds:.1} s{why}");
     }
 }

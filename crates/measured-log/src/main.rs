@@ -70,14 +70,10 @@ fn main() -> ExitCode {
         Source::Contactnets { source, target } => (import::contactnets(&source), target),
         Source::CmuPush { source, friction_force, target } => (import::cmu_push(&source, friction_force), target),
     };
-    match imported.and_then(|(log, notes)| write(&target, &log, &notes)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            // 2 is bad input; a disk that refuses is a failure.
-            if let Error::Write { .. } = error { ExitCode::FAILURE } else { ExitCode::from(2) }
-        }
-    }
+    // 2 is bad input; a disk that refuses is a failure.
+    program::end(imported.and_then(|(log, notes)| write(&target, &log, &notes)), |error| {
+        if let Error::Write { .. } = error { 1 } else { 2 }
+    })
 }
 
 fn write(target: &Target, log: &Log, notes: &Notes) -> Result<(), Error> {
@@ -87,8 +83,8 @@ fn write(target: &Target, log: &Log, notes: &Notes) -> Result<(), Error> {
     };
     measured_log::write(&target.out, log, format, notes)?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
-    whole_file::out!("{}: {} episodes, {rows} rows", target.out.display(), log.episodes.len());
-    let words = ["cargo", "xtask", "diagnose", "--measured", &whole_file::typed(&target.out)];
-    whole_file::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the nominal model lacks")]);
+    program::out!("{}: {} episodes, {rows} rows", target.out.display(), log.episodes.len());
+    let words = ["cargo", "xtask", "diagnose", "--measured", &program::typed(&target.out)];
+    program::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the nominal model lacks")]);
     Ok(())
 }

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use anyhow::{Context as _, Result, anyhow};
 use clap::Parser;
@@ -15,7 +14,7 @@ use prior::features::{self, ActionInput};
 use prior::{
     GradientPath, Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, curve_csv, write_atomically,
 };
-use whole_file::typed;
+use program::{Failed, typed};
 
 /// Trains the prior: LSTM with a mixture density head over (s, Θ).
 #[derive(Debug, Parser)]
@@ -77,31 +76,11 @@ Examples:
   cargo xtask train --robot jaco --epochs 20 --data runs/data/jaco-small --out runs/priors/jaco-small";
 
 /// What went wrong after the input was found to be good.
-#[derive(Debug)]
-struct Failed;
-
-impl std::fmt::Display for Failed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("the training stopped, finished epochs are kept")
-    }
-}
+const FAILED: Failed = Failed::new("the training stopped, finished epochs are kept");
 
 fn main() -> ExitCode {
-    // Silent unless RUST_LOG asks: results go to files, progress to the bar.
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "off".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    let arguments = Arguments::parse();
-    match run(&arguments) {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => {
-            whole_file::say!("interrupted: finished epochs are kept, run the same command again to go on");
-            ExitCode::from(130)
-        }
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
-        }
-    }
+    program::log_on_request();
+    program::resumable("epochs", run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
@@ -159,14 +138,14 @@ fn run(arguments: &Arguments) -> Result<bool> {
     ]
     .map(|(key, value)| (key.to_string(), value))
     .into();
-    if !train(&mut trainer, &config, &state).context(Failed)? {
+    if !train(&mut trainer, &config, &state).context(FAILED)? {
         return Ok(false);
     }
     let checkpoint = trainer.checkpoint(provenance);
-    checkpoint.save(&out).context(Failed)?;
-    write_atomically(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes()).context(Failed)?;
-    prior::pictures::learning_curve(&arguments.robot, trainer.curve()).save(&out.join("curve")).context(Failed)?;
-    whole_file::out!(
+    checkpoint.save(&out).context(FAILED)?;
+    write_atomically(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes()).context(FAILED)?;
+    prior::pictures::learning_curve(&arguments.robot, trainer.curve()).save(&out.join("curve")).context(FAILED)?;
+    program::out!(
         "{}: best epoch {} of {}, held-out {:.3} nats a step on {} episodes",
         out.display(),
         checkpoint.facts.best_epoch,
@@ -194,7 +173,7 @@ fn suggest_next(robot: &str, root: &Path, out: &Path) {
         let words = ["eval", "--domain", "D4", "--robot", robot, "--prior", &prior, "--trials", "10"];
         next.push((command(&words), "plays with it"));
     }
-    whole_file::next(&next);
+    program::next(&next);
 }
 
 /// Goes on with the training in `state` where there is one of the same settings, else begins.
@@ -232,15 +211,13 @@ fn open_trainer(
             seed.0,
         ));
     }
-    whole_file::say!("{} epochs are finished already", trainer.curve().len());
+    program::say!("{} epochs are finished already", trainer.curve().len());
     Ok(trainer)
 }
 
 /// Epochs until the end; false where interrupted.
 fn train(trainer: &mut Trainer, config: &TrainConfig, state: &Path) -> Result<bool> {
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupted);
-    ctrlc::set_handler(move || whole_file::interrupted(&flag)).context("cannot listen for interrupts")?;
+    let interrupted = program::interrupts()?;
     let bar = ProgressBar::new(config.max_epochs as u64);
     let style = "{bar:40} {pos}/{len} epochs, {eta} left, {msg}";
     bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
@@ -264,7 +241,7 @@ fn train(trainer: &mut Trainer, config: &TrainConfig, state: &Path) -> Result<bo
             started.elapsed().as_secs_f64(),
         );
         if bar.is_hidden() {
-            whole_file::say!("{line}");
+            program::say!("{line}");
         } else {
             bar.set_message(line);
         }

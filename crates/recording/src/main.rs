@@ -25,13 +25,7 @@ Examples:
 const MAGIC: &[u8] = b"RRF";
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(2)
-        }
-    }
+    program::finish(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
@@ -46,7 +40,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let bytes = recording::viewer::recording(&trace)?;
     whole_file::write(&out, &bytes, whole_file::Existing::Replace)
         .with_context(|| format!("cannot write {}", out.display()))?;
-    whole_file::say!(
+    program::say!(
         "written to {}: open it with the viewer of Rerun 0.36.3 (pip install rerun-sdk==0.36.3)",
         out.display()
     );

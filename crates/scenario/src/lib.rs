@@ -29,7 +29,7 @@ pub use error::Error;
 pub use explain::Explanation;
 pub use file_schema::{FileKind, file_schema};
 pub use layers::{LayerKind, Source};
-pub use load::{PRESET, Selection, find_root};
+pub use load::{PRESET, Selection, find_root, project_root};
 pub use provenance::commit;
 pub use schema::{
     AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,

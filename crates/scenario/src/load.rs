@@ -94,6 +94,15 @@ pub fn find_root(start: &Path) -> Result<PathBuf, Error> {
     Ok(physics_model::robot::find_root(start)?)
 }
 
+/// The project folder that a command line names, or the nearest one at or above the current folder.
+///
+/// # Errors
+///
+/// [`Error::Root`] where there is none.
+pub fn project_root(given: Option<&Path>) -> Result<PathBuf, Error> {
+    given.map_or_else(|| find_root(Path::new(".")), |root| Ok(root.to_path_buf()))
+}
+
 fn locate(kind: &'static str, name: &str, folder: &Path) -> Result<PathBuf, Error> {
     if name.contains('/') || Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         return Ok(PathBuf::from(name));

@@ -6,10 +6,10 @@ use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, anyhow};
+use anyhow::{Context as _, Result, anyhow};
 use clap::{Parser, Subcommand};
-use scenario::{Explanation, FileKind, PRESET, Problem, Scenario, Selection, file_schema, find_root};
-use whole_file::typed;
+use program::{Failed, typed};
+use scenario::{Explanation, FileKind, PRESET, Problem, Scenario, Selection, file_schema, project_root};
 
 /// Explains scenario files, and describes their format to editors.
 #[derive(Debug, Parser)]
@@ -79,41 +79,33 @@ Examples:
   cargo xtask scenario check D4 --set task.horizon=20 --json";
 
 fn main() -> ExitCode {
-    let task = Arguments::parse().task;
-    let result = match &task {
-        Task::Check(check) => run(check),
-        Task::Schema { robot } => {
-            let kind = if *robot { FileKind::Robot } else { FileKind::Scenario };
-            Ok(format!("{:#}\n", file_schema(kind)))
-        }
-    };
-    match result {
-        Ok(text) => match whole_file::print(&text) {
-            Ok(()) => {
-                if let Task::Check(check) = &task
-                    && !check.json
-                {
-                    suggest_next(check);
-                }
-                ExitCode::SUCCESS
-            }
-            Err(error) => {
-                whole_file::say!("error: cannot print: {error}");
-                ExitCode::FAILURE
-            }
-        },
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(2)
-        }
-    }
+    program::finish(run(&Arguments::parse().task))
 }
 
-fn run(check: &Check) -> Result<String> {
-    let root = match &check.root {
-        Some(root) => root.clone(),
-        None => find_root(&std::env::current_dir()?)?,
+fn run(task: &Task) -> Result<()> {
+    let text = match task {
+        Task::Check(check) => explain(check)?,
+        Task::Schema { robot } => {
+            let kind = if *robot { FileKind::Robot } else { FileKind::Scenario };
+            format!(
+                "{:#}
+",
+                file_schema(kind)
+            )
+        }
     };
+    program::print(&text).context(Failed::new("cannot print"))?;
+    if let Task::Check(check) = task
+        && !check.json
+    {
+        suggest_next(check);
+    }
+    Ok(())
+}
+
+/// What a check prints.
+fn explain(check: &Check) -> Result<String> {
+    let root = project_root(check.root.as_deref())?;
     let selection = Selection {
         root: root.clone(),
         domain: check.domain.clone(),
@@ -133,7 +125,7 @@ fn run(check: &Check) -> Result<String> {
         }
     }
     if let Some(warning) = check.model.as_ref().and_then(|_| scenario.truth_warning()) {
-        whole_file::say!("{warning}");
+        program::say!("{warning}");
     }
     Ok(if check.json { json(&scenario, &explanations) } else { text(&scenario, &explanations) })
 }
@@ -157,7 +149,7 @@ fn suggest_next(check: &Check) {
         let demo = [command(&["cargo", "xtask", "demo"]), chosen, command(&["--method", "no-rnn"])].concat();
         next.push((demo, "shows one episode"));
     }
-    whole_file::next(&next);
+    program::next(&next);
 }
 
 fn json(scenario: &Scenario, explanations: &[Explanation]) -> String {

@@ -1,5 +1,5 @@
-//! What goes out of a program and comes into it. Files appear whole or not at all: a program killed at any moment leaves the old file or the new one. Those of
-//! others are read in bounded memory, and quoted in one line. What is printed may meet a closed pipe.
+//! Files that appear whole or not at all: a program killed at any moment leaves the old file or the new one. Files of others are read in
+//! bounded memory, and quoted in one line. What programs print is the business of `program`.
 //!
 //! # Example
 //!
@@ -12,10 +12,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod next;
 mod owner;
 mod plain;
-mod terminal;
 
 use std::cell::Cell;
 use std::io::{self, Read as _, Write as _};
@@ -23,10 +21,8 @@ use std::panic::{UnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-pub use next::{next, typed};
 pub use owner::{Owner, check_owner};
 pub use plain::plain;
-pub use terminal::{complain, interrupted, print, say, show};
 
 /// What to do with a file that is already there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,8 +16,8 @@ const MEMORY_GB: f64 = 4.0;
 const GB: f64 = 1e9;
 
 pub(crate) fn checks(root: &Path) -> Vec<Check> {
-    let target = crate::program::folder();
-    let built = crate::program::path("eval").is_file();
+    let target = crate::built::folder();
+    let built = crate::built::path("eval").is_file();
     let build_gb = if built { NEXT_BUILD_GB } else { FIRST_BUILD_GB };
     let runs = root.join("runs");
     let mut checks = vec![

@@ -3,15 +3,16 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use clap::Parser;
 use diagnose_benchmark::generate::Actions;
 use diagnose_benchmark::rehearsal::record;
 use discrepancy::ModelFile;
 use measured_log::{Episode, Format, Notes};
 use pomdp::Seed;
-use scenario::{Problem, Selection, find_root};
-use whole_file::{Existing, typed};
+use program::{Failed, typed};
+use scenario::{Problem, Selection};
+use whole_file::Existing;
 
 /// Records pushes of one object in the true world of a scenario as a log for diagnose, with the effects that the model knows of as model.toml.
 #[derive(Debug, Parser)]
@@ -45,26 +46,12 @@ Examples:
   cargo xtask record-log --domain tilted --actions passive --out runs/rehearsal/log
   cargo xtask record-log --domain D1 --set 'effects.truth=[{ viscous_damping = { coefficient_nspm = 3.0 } }]' --out runs/rehearsal/viscous";
 
-/// The log is recorded and cannot be kept.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-struct Failed(String);
-
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(if error.is::<Failed>() { 1 } else { 2 })
-        }
-    }
+    program::finish(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => find_root(&std::env::current_dir().context("cannot find the current folder")?)?,
-    };
+    let root = scenario::project_root(arguments.root.as_deref())?;
     let selection = Selection {
         domain: arguments.domain.clone(),
         robot: arguments.robot.clone(),
@@ -80,16 +67,16 @@ fn run(arguments: &Arguments) -> Result<()> {
     }
     match measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new()) {
         Err(taken @ measured_log::Error::Exists { .. }) => return Err(taken.into()),
-        Err(error) => return Err(Failed(error.to_string()).into()),
+        Err(error) => return Err(Failed(error.to_string().into()).into()),
         Ok(()) => {}
     }
     let model = ModelFile::of_effects(problem.scenario.effects.model.clone()).to_toml()?;
     whole_file::write(&model_file, model.as_bytes(), Existing::Replace)
-        .map_err(|error| Failed(format!("{error}: {}", error.source)))?;
+        .map_err(|error| Failed(format!("{error}: {}", error.source).into()))?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
-    whole_file::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
+    program::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
     let (folder, model) = (typed(&arguments.out), typed(&model_file));
     let words = ["cargo", "xtask", "diagnose", "--measured", &folder, "--model", &model];
-    whole_file::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the model lacks")]);
+    program::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the model lacks")]);
     Ok(())
 }

@@ -30,7 +30,7 @@ impl Bar {
         let (done, budget) = (self.bar.position(), self.bar.length().unwrap_or_default());
         let left = if done == 0 { String::new() } else { format!(", at most {} s left", self.bar.eta().as_secs()) };
         let elapsed = self.bar.elapsed().as_secs();
-        whole_file::say!("{}: {done} of at most {budget} simulated episodes, {elapsed} s{left}", self.bar.message());
+        program::say!("{}: {done} of at most {budget} simulated episodes, {elapsed} s{left}", self.bar.message());
     }
 }
 

@@ -9,7 +9,7 @@ use dataset::Reader;
 use prior::calibrate::{Calibration, calibrate};
 use prior::features::{self, ActionInput};
 use prior::{Checkpoint, Episode, Models, Sequence, TrainConfig, write_atomically};
-use whole_file::typed;
+use program::typed;
 
 /// Compares what a prior says with the truth of episodes that it was not trained on.
 #[derive(Debug, Parser)]
@@ -47,13 +47,7 @@ Examples:
   cargo xtask calibrate --out runs/calibration/sawyer";
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(2)
-        }
-    }
+    program::finish(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
@@ -129,10 +123,10 @@ fn run(arguments: &Arguments) -> Result<()> {
         figure.save(&out.join(name))?;
     }
     if arguments.json {
-        whole_file::out!("{}", serde_json::to_string(&calibration)?);
+        program::out!("{}", serde_json::to_string(&calibration)?);
     } else {
         print(&calibration);
-        whole_file::say!("written to {}", typed(&out.join("calibration.json")));
+        program::say!("written to {}", typed(&out.join("calibration.json")));
         let words = [
             "cargo",
             "xtask",
@@ -147,7 +141,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             "10",
         ];
         if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
-            whole_file::next(&[(words.map(String::from).to_vec(), "plays with it")]);
+            program::next(&[(words.map(String::from).to_vec(), "plays with it")]);
         }
     }
     Ok(())
@@ -155,13 +149,13 @@ fn run(arguments: &Arguments) -> Result<()> {
 
 fn print(calibration: &Calibration) {
     let Calibration { episodes, steps, nll, baseline_nll, .. } = calibration;
-    whole_file::out!(
+    program::out!(
         "{episodes} episodes, {steps} steps; nats a step: network {nll:.2}, sampling distribution {baseline_nll:.2}"
     );
     if let Some(memoryless) = calibration.memoryless_nll {
-        whole_file::out!("the same network without memory: {memoryless:.2}");
+        program::out!("the same network without memory: {memoryless:.2}");
     }
-    whole_file::out!(
+    program::out!(
         "\n{:<20} {:>8} {:>7} {:>7} {:>6} {:>9} {:>8}",
         "parameter",
         "episodes",
@@ -172,7 +166,7 @@ fn print(calibration: &Calibration) {
         "touched"
     );
     for parameter in calibration.parameters.iter().filter(|p| calibration.static_targets.contains(&p.name)) {
-        whole_file::out!(
+        program::out!(
             "{:<20} {:>8} {:>7.3} {:>7.3} {:>6.3} {:>9.3} {:>8.3}",
             parameter.name,
             parameter.episodes,
@@ -183,9 +177,9 @@ fn print(calibration: &Calibration) {
             parameter.coverage90_last_touched.unwrap_or(f64::NAN),
         );
     }
-    whole_file::out!("");
+    program::out!("");
     for class in &calibration.classes {
-        whole_file::out!(
+        program::out!(
             "{}: right at the last step in {:.3}, expected calibration error {:.3}, confusion {:?}",
             class.name,
             class.last_accuracy,
@@ -196,18 +190,18 @@ fn print(calibration: &Calibration) {
     if let Some(found) = calibration.obstacle_after_contact_accuracy {
         let touched = calibration.obstacle_contact_episodes;
         let denied = calibration.no_obstacle_accuracy.unwrap_or(f64::NAN);
-        whole_file::out!(
+        program::out!(
             "obstacle found in {found:.3} of {touched} episodes that touched it, denied in {denied:.3} without one"
         );
         let since: Vec<String> = calibration.obstacle_found_since_touch.iter().map(|f| format!("{f:.2}")).collect();
         let untouched = calibration.untouched_obstacle_found.unwrap_or(f64::NAN);
-        whole_file::out!("by steps since the touch: {}; of those that nothing touched {untouched:.3}", since.join(" "));
+        program::out!("by steps since the touch: {}; of those that nothing touched {untouched:.3}", since.join(" "));
     }
-    whole_file::out!("\nsteps since the first contact, nats of Θ: network, sampling distribution, without memory");
+    program::out!("\nsteps since the first contact, nats of Θ: network, sampling distribution, without memory");
     for report in calibration.sharpening.iter().filter(|r| r.since_contact.count > 0) {
         let score = &report.since_contact;
         let memoryless = score.static_nll.memoryless.map_or(String::new(), |nll| format!("{nll:>8.2}"));
-        whole_file::out!(
+        program::out!(
             "{:>4} {:>7} {:>8.2} {:>8.2} {memoryless}",
             report.step,
             score.count,

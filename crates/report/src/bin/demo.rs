@@ -9,10 +9,11 @@ use clap::Parser;
 use experiments::{TrialRecord, play_watched};
 use pomdp::Seed;
 use prior::Suggester;
+use program::{Failed, typed};
 use recording::{EpisodeTrace, Moment};
 use report::{Observer, describe, episode_figure, episode_film, episode_page};
 use scenario::{Problem, Scenario, Selection};
-use whole_file::{Owner, typed};
+use whole_file::Owner;
 
 /// Plays one episode, shows it in the terminal, and leaves a moving picture of it from above, a picture of the whole, a page and a trace.
 #[derive(Debug, Parser)]
@@ -66,25 +67,14 @@ Examples:
   cargo xtask demo --domain D3 --robot jaco --trial 4 --quick";
 
 /// What went wrong after the input was found to be good.
-#[derive(Debug, thiserror::Error)]
-#[error("the episode was not shown")]
-struct Failed;
+const FAILED: Failed = Failed::new("the episode was not shown");
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(if error.downcast_ref::<Failed>().is_some() { 1 } else { 2 })
-        }
-    }
+    program::finish(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => scenario::find_root(&std::env::current_dir()?)?,
-    };
+    let root = scenario::project_root(arguments.root.as_deref())?;
     let selection = Selection {
         root: root.clone(),
         domain: arguments.domain.clone(),
@@ -95,7 +85,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         effects: None,
     };
     let mut scenario = selection.load()?;
-    scenario.planner.threads = start_threads(arguments.threads).context(Failed)?;
+    scenario.planner.threads = start_threads(arguments.threads).context(FAILED)?;
     let scenario = scenario;
     let problem = Problem::assemble(&scenario, &root)?;
     let method = arguments.method.unwrap_or(match scenario.belief.filter {
@@ -116,16 +106,16 @@ fn run(arguments: &Arguments) -> Result<()> {
     });
     let owner = Owner { program: "demo", subject: String::new() };
     whole_file::check_owner(&out, "trace.json").and_then(|()| owner.check(&out, &FILES)).map_err(|e| taken(&e))?;
-    std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display())).context(Failed)?;
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display())).context(FAILED)?;
     let game = Game { arguments, scenario: &scenario, problem: &problem, method, prior: prior.as_ref() };
-    let (record, trace) = game.play(scenario::commit(&root)).context(Failed)?;
-    owner.claim(&out).context(Failed)?;
-    write(&trace, &out).context(Failed)?;
+    let (record, trace) = game.play(scenario::commit(&root)).context(FAILED)?;
+    owner.claim(&out).context(FAILED)?;
+    write(&trace, &out).context(FAILED)?;
     if arguments.json {
-        whole_file::print(&format!("{}\n", serde_json::to_string(&record)?)).context(Failed)?;
+        program::print(&format!("{}\n", serde_json::to_string(&record)?)).context(FAILED)?;
     } else {
-        whole_file::print(&describe::summary(&trace, &record)).context(Failed)?;
-        whole_file::say!("written to {}: {}", typed(&out), FILES.join(", "));
+        program::print(&describe::summary(&trace, &record)).context(FAILED)?;
+        program::say!("written to {}: {}", typed(&out), FILES.join(", "));
         suggest_next(arguments, &out);
     }
     Ok(())
@@ -148,7 +138,7 @@ fn start_threads(asked: Option<u32>) -> Result<usize> {
 
 /// The same task again, in numbers or step by step.
 fn suggest_next(arguments: &Arguments, out: &Path) {
-    whole_file::say!("open {} in a browser to see it step by step", typed(&out.join("episode.html")));
+    program::say!("open {} in a browser to see it step by step", typed(&out.join("episode.html")));
     let mut eval: Vec<String> = ["cargo", "xtask", "eval", "--domain", &arguments.domain].map(String::from).to_vec();
     let chosen = [("--robot", &arguments.robot, "sawyer"), ("--preset", &arguments.preset, scenario::PRESET)];
     for (option, value, usual) in chosen {
@@ -163,7 +153,7 @@ fn suggest_next(arguments: &Arguments, out: &Path) {
     eval.extend(arguments.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
     eval.extend(["--trials".to_string(), "10".into()]);
     let rerun = ["cargo".to_string(), "xtask".into(), "rerun".into(), typed(out)];
-    whole_file::next(&[
+    program::next(&[
         (eval, "plays more worlds of it, and prints a table"),
         (rerun.to_vec(), "makes a recording for the Rerun viewer; its first build takes a quarter of an hour"),
     ]);
@@ -190,11 +180,11 @@ impl Game<'_> {
             arguments.trial,
             arguments.seed
         );
-        whole_file::say(&title);
+        program::say(&title);
         let mut count = 0;
         let mut tell = |moment: &Moment| {
             // Whatever becomes of the terminal, the episode is played to its end.
-            whole_file::say(&describe::moment(count, moment));
+            program::say(&describe::moment(count, moment));
             count += 1;
         };
         let mut observer = Observer::new(&problem.model, &mut tell);

@@ -7,6 +7,7 @@ use anyhow::{Result, anyhow};
 use clap::Parser;
 use experiments::Archive;
 use page::may_be_replaced;
+use program::Failed;
 use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
 
 /// Makes a self-contained HTML page of a run of `eval`, of all tables of `eval --all`, or of an episode of `demo`.
@@ -25,19 +26,8 @@ Examples:
   cargo xtask report runs/demo/D4-sawyer-surmise-mixture
   cargo xtask report runs/eval/D4-sawyer-surmise";
 
-/// The page is made and cannot be kept.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}: {cause}", cause = .0.source)]
-struct Unwritten(whole_file::Error);
-
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            whole_file::complain(&error);
-            ExitCode::from(if error.is::<Unwritten>() { 1 } else { 2 })
-        }
-    }
+    program::finish(run(&Arguments::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
@@ -58,7 +48,8 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         suite_page(&suite)
     };
-    whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace).map_err(Unwritten)?;
-    whole_file::say!("written to {}: open it in a browser", whole_file::typed(&out));
+    whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace)
+        .map_err(|error| Failed(format!("{error}: {}", error.source).into()))?;
+    program::say!("written to {}: open it in a browser", program::typed(&out));
     Ok(())
 }

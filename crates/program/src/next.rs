@@ -8,7 +8,7 @@ use crate::say;
 /// results.
 ///
 /// ```
-/// whole_file::next(&[(["cargo", "xtask", "report", "runs/my run"].map(String::from).to_vec(), "makes a page of it")]);
+/// program::next(&[(["cargo", "xtask", "report", "runs/my run"].map(String::from).to_vec(), "makes a page of it")]);
 /// ```
 pub fn next(commands: &[(Vec<String>, &str)]) {
     if commands.is_empty() {

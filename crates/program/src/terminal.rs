@@ -1,10 +1,9 @@
-//! What programs say, and what they do when interrupted.
+//! What programs say.
 
 use std::fmt::Display;
 use std::io::{self, Write as _};
-use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::one_line;
+use whole_file::one_line;
 
 /// Prints to standard output. A reader that has seen enough, and closed the pipe, is no error.
 ///
@@ -35,14 +34,6 @@ pub fn say(text: &str) {
 /// Says why a program ends: one line, whatever names and files are quoted in it.
 pub fn complain(error: &dyn Display) {
     say(&format!("error: {}", one_line(&format!("{error:#}"), 4000)));
-}
-
-/// What an interrupt does: the first asks for an end by setting `flag`; who asks twice does not want to wait for what is at work, and finished work is
-/// safe.
-pub fn interrupted(flag: &AtomicBool) {
-    if flag.swap(true, Ordering::Relaxed) {
-        std::process::exit(130);
-    }
 }
 
 /// [`show`] of a line, as `println!` formats it.

@@ -1,0 +1,71 @@
+//! How a program ends.
+
+use std::borrow::Cow;
+use std::fmt::Display;
+use std::process::ExitCode;
+
+use crate::{complain, say};
+
+/// Marks what went wrong after the input was found to be good, by its own words or as the context of a cause: exit code 1 instead of 2.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Failed(pub Cow<'static, str>);
+
+impl Failed {
+    /// With what stopped, and what is kept.
+    #[must_use]
+    pub const fn new(text: &'static str) -> Self {
+        Self(Cow::Borrowed(text))
+    }
+}
+
+/// The exit code of an error: 1 where it is marked as [`Failed`], else 2.
+#[must_use]
+pub fn code(error: &anyhow::Error) -> u8 {
+    if error.is::<Failed>() { 1 } else { 2 }
+}
+
+/// Ends a program: says why where it went wrong.
+pub fn finish(result: anyhow::Result<()>) -> ExitCode {
+    end(result, code)
+}
+
+/// Ends a program that can be started again to go on: `result` is false where it was interrupted. `kept` is what is not lost, such as
+/// "trials".
+pub fn resumable(kept: &str, result: anyhow::Result<bool>) -> ExitCode {
+    match result {
+        Ok(false) => {
+            say(&format!("interrupted: finished {kept} are kept, run the same command again to go on"));
+            ExitCode::from(130)
+        }
+        done => finish(done.map(drop)),
+    }
+}
+
+/// Ends a program whose errors are of a kind of its own; `code` is the exit code of one.
+pub fn end<E: Display>(result: Result<(), E>, code: impl FnOnce(&E) -> u8) -> ExitCode {
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain(&error);
+            ExitCode::from(code(&error))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::anyhow;
+
+    use super::*;
+
+    #[test]
+    fn a_mark_counts_as_the_error_and_as_the_context_of_a_cause() {
+        let mark = Failed::new("the run stopped");
+        let with_cause = anyhow!("no space left").context(mark.clone());
+        assert_eq!(format!("{with_cause:#}"), "the run stopped: no space left");
+        assert_eq!(code(&with_cause.context("trial 3")), 1);
+        assert_eq!(code(&mark.into()), 1);
+        assert_eq!(code(&anyhow!("the run stopped")), 2);
+    }
+}
