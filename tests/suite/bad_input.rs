@@ -99,7 +99,7 @@ fn what_is_wrong_in_a_file_is_said_in_words() {
         ("--set task.horizon=far", &["`task.horizon`", "expected a whole number, 0 or more, found the text \"far\""]),
         ("--set task.horizon=2.5", &["expected a whole number, 0 or more, found 2.5"]),
         ("--set task.discount=true", &["`task.discount`", "expected a number, found true"]),
-        ("--set task.tool_start_m=[0.1,0.2]", &["`task.tool_start_m`", "expected a list of 3, found 2"]),
+        ("--set task.tool_start_m=[0.1,0.2]", &["task.tool_start_m", "expected a list of 3, found 2"]),
         ("--set task=3", &["`task`", "expected a table, found 3"]),
         ("--set task.goal.radius_cm=4", &["there is no key `radius_cm`", "nearest is `radius_m`"]),
         ("--set belief.filter=best", &["`belief.filter`", "there is no choice `best`"]),
