@@ -1,7 +1,7 @@
 //! Edges and corners that are round where the model has them sharp.
 //!
-//! The shape is a smaller one, by r on every side, swept by a ball of radius r: faces stay where they are, an edge of a box on the table lies lower by
-//! (√2 − 1) r, a corner by (√3 − 1) r, and the sole ends r before the sides do.
+//! The shape is a smaller one, by r on every side, swept by a ball of radius r. Faces stay where they are. An edge of a box on the table lies
+//! lower by (√2 − 1) r, a corner by (√3 − 1) r. The sole ends r before the sides do.
 //!
 //! | symbol | key | unit | plausible | source |
 //! |---|---|---|---|---|

@@ -10,7 +10,7 @@
 //!
 //! Shows in force and yaw at one place of the table: there a push takes more or less force, or turns the object.
 //!
-//! Acts on the contacts of free bodies with the table (K). The engine knows one friction coefficient for all contacts of two shapes, so that the
+//! Acts on the contacts of free bodies with the table (K). The engine knows one friction coefficient for all contacts of two shapes. So the
 //! object gets four support points at its corners or rim, each a shape of its own: a patch under one side of the object turns it.
 
 use schemars::JsonSchema;
