@@ -19,6 +19,7 @@ fn package(binary: &str) -> &str {
         "import-log" => "measured-log",
         "record-log" => "diagnose-benchmark",
         "diagnose" => "discrepancy",
+        "docs" => "book",
         // Called like their packages.
         other => other,
     }

@@ -1,6 +1,6 @@
 //! `cargo xtask completions SHELL`: a script that completes the verbs, and the options of all programs that are built.
 
-mod help;
+pub(crate) mod help;
 
 use std::path::Path;
 use std::process::{Command as Process, ExitCode};

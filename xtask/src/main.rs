@@ -3,6 +3,7 @@
 mod built;
 mod ci;
 mod completions;
+mod describe;
 mod doctor;
 mod groups;
 
@@ -60,10 +61,16 @@ enum Verb {
     /// Explains and checks every key of a scenario; prints the format's schema for editors.
     #[command(disable_help_flag = true)]
     Scenario(Rest),
+    /// Builds the book and the API docs into one folder.
+    #[command(disable_help_flag = true)]
+    Docs(Rest),
     /// Checks that this machine has what the project needs, before anything is built.
     Doctor(doctor::Options),
     /// Prints a script that completes these commands in a shell.
     Completions(completions::Options),
+    /// Prints all commands with their options as JSON, for the page of commands.
+    #[command(hide = true)]
+    Describe,
     /// Runs exactly what CI runs: formatting, lints, all tests.
     #[command(after_help = "Examples:\n  cargo xtask ci\n  cargo xtask ci --all-features")]
     Ci(ci::Options),
@@ -98,8 +105,10 @@ fn main() -> ExitCode {
         Verb::DiagnoseBenchmark(rest) => become_program("diagnose-benchmark", &rest.arguments),
         Verb::Bench(rest) => become_program("bench", &rest.arguments),
         Verb::Scenario(rest) => become_program("scenario", &rest.arguments),
+        Verb::Docs(rest) => become_program("docs", &rest.arguments),
         Verb::Doctor(options) => doctor::run(&options),
         Verb::Completions(options) => completions::run(&options),
+        Verb::Describe => describe::run(),
         Verb::Ci(options) => ci::run(&options),
     };
     result.unwrap_or_else(|error| {

@@ -5,13 +5,21 @@ use clap::{Arg, Command};
 /// What a program says of itself.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Help {
+    /// What it is for: the first paragraph.
+    pub(crate) about: String,
+    /// The first command behind the options that can be typed.
+    pub(crate) example: Option<String>,
     options: Vec<Opt>,
+    /// Arguments without a name, and what they are.
+    pub(crate) arguments: Vec<(String, String)>,
     pub(crate) commands: Vec<(String, String)>,
 }
 
 /// An option that begins with two dashes.
 #[derive(Debug, Default, PartialEq)]
 struct Opt {
+    /// As the help has it: `--robot <ROBOT>`.
+    usage: String,
     long: String,
     takes_value: bool,
     values: Vec<String>,
@@ -19,6 +27,18 @@ struct Opt {
 }
 
 impl Help {
+    /// Options as they are typed and what they are for, but for those that all programs have.
+    pub(crate) fn usages(&self) -> impl Iterator<Item = (String, String)> + '_ {
+        let own = self.options.iter().filter(|option| !["help", "version"].contains(&option.long.as_str()));
+        own.map(|option| {
+            let values = match &option.values[..] {
+                [] => String::new(),
+                values => format!(" Values: {}.", values.join(", ")),
+            };
+            (option.usage.clone(), format!("{}{values}", option.about))
+        })
+    }
+
     /// As a command of that name.
     pub(crate) fn command(&self, name: &str, about: &str) -> Command {
         let options = self.options.iter().filter(|o| !["help", "version"].contains(&o.long.as_str())).map(|option| {
@@ -38,20 +58,37 @@ fn kept(text: &str) -> &'static str {
     text.to_string().leak()
 }
 
-/// Reads what clap prints for `-h`.
+/// Reads what clap prints for `-h` and for `--help`.
 pub(crate) fn parse(text: &str) -> Help {
     let mut help = Help::default();
+    let first = text.split("\n\n").next().unwrap_or_default();
+    if !first.starts_with("Usage:") {
+        help.about = first.split_whitespace().collect::<Vec<_>>().join(" ");
+    }
     let mut section = "";
     for line in text.lines() {
         let (indent, entry) = (line.len() - line.trim_start().len(), line.trim());
+        if entry.is_empty() {
+            continue;
+        }
+        if let Some(at) = entry.find("cargo xtask ").filter(|_| section != "Options:" || indent == 0) {
+            // What follows two spaces is a remark.
+            help.example.get_or_insert(entry[at..].split("  ").next().unwrap_or_default().trim().into());
+        }
         if indent == 0 {
             section = entry;
         } else if section == "Options:" {
             if entry.starts_with('-') && indent < 10 {
                 help.options.extend(option(entry));
             } else if let Some(last) = help.options.last_mut() {
-                // A description that was wrapped.
-                last.about = [&last.about, " ", entry].concat().trim().to_string();
+                more(&mut last.about, entry);
+            }
+        } else if section == "Arguments:" {
+            if entry.starts_with(['<', '[']) && indent < 10 {
+                let (usage, about) = entry.split_once("  ").unwrap_or((entry, ""));
+                help.arguments.push((usage.into(), about.trim().into()));
+            } else if let Some((_, about)) = help.arguments.last_mut() {
+                more(about, entry);
             }
         } else if section == "Commands:" && indent < 4 {
             let (name, about) = entry.split_once("  ").unwrap_or((entry, ""));
@@ -64,9 +101,19 @@ pub(crate) fn parse(text: &str) -> Help {
         if let Some((about, values)) = option.about.clone().split_once("[possible values: ") {
             option.values = values.split(']').next().unwrap_or_default().split(", ").map(String::from).collect();
             option.about = about.trim().to_string();
+        } else if let Some((about, values)) = option.about.clone().split_once("Possible values:") {
+            // One a line, with what it means: `- local: on this machine`.
+            let names = values.split("- ").filter_map(|value| value.split(':').next());
+            option.values = names.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty()).collect();
+            option.about = about.trim().to_string();
         }
     }
     help
+}
+
+/// A description that was wrapped.
+fn more(about: &mut String, entry: &str) {
+    *about = [about.as_str(), " ", entry].concat().trim().to_string();
 }
 
 /// `-h, --help  Print help` or `--robot <ROBOT>  Arm`.
@@ -75,7 +122,8 @@ fn option(entry: &str) -> Option<Opt> {
     let long = names.split(", ").find_map(|name| name.strip_prefix("--"))?;
     let end = long.find([' ', '[', '=', '.']).unwrap_or(long.len());
     let takes_value = names.contains('<') || names.contains("[<");
-    Some(Opt { long: long[..end].into(), takes_value, values: Vec::new(), about: about.trim().into() })
+    let (usage, long) = (names.trim().into(), long[..end].into());
+    Some(Opt { usage, long, takes_value, values: Vec::new(), about: about.trim().into() })
 }
 
 #[cfg(test)]
@@ -108,6 +156,41 @@ Options:
         assert_eq!(help.options[0].values, ["local", "slurm", "hq"]);
         assert_eq!(help.options[0].about, "Who plays [default: local]");
         assert!(!help.options[1].takes_value && help.options[2].takes_value);
+    }
+
+    const LONG: &str = "\
+Checks a
+file.
+
+Usage: check [OPTIONS] <FILE>
+
+Arguments:
+  <FILE>
+          What to check.
+
+Options:
+      --engine <ENGINE>
+          Who plays. As in cargo xtask eval.
+
+          Possible values:
+          - local: on this machine
+          - slurm: on a cluster
+
+  -h, --help
+          Print help
+
+Example: cargo xtask scenario check D4
+";
+
+    #[test]
+    fn the_long_help_says_the_same_and_an_example() {
+        let help = parse(LONG);
+        assert_eq!(help.about, "Checks a file.");
+        assert_eq!(help.example.as_deref(), Some("cargo xtask scenario check D4"));
+        assert_eq!(help.arguments, [("<FILE>".to_owned(), "What to check.".to_owned())]);
+        let usages: Vec<_> = help.usages().collect();
+        let about = "Who plays. As in cargo xtask eval. Values: local, slurm.";
+        assert_eq!(usages, [("--engine <ENGINE>".to_owned(), about.to_owned())]);
     }
 
     #[test]
