@@ -1,5 +1,6 @@
 //! Helpers of the end-to-end suite: running the programs as a user does.
 
+pub mod prose;
 pub mod slurm;
 
 use std::path::{Path, PathBuf};
@@ -15,6 +16,9 @@ pub fn root() -> PathBuf {
 
 pub use skipped::skipped;
 
+/// Says that `cargo xtask ci` has built the programs: where each test is a process of its own, none has to ask cargo again.
+const BUILT: &str = "SURMISE_BUILT";
+
 /// A release program, built from this checkout if need be, set to run at its root. All programs are built together, as `xtask` does, and
 /// once for all tests.
 ///
@@ -23,9 +27,12 @@ pub use skipped::skipped;
 /// If it cannot be built.
 #[must_use]
 pub fn program(binary: &str) -> Command {
-    static BUILT: OnceLock<bool> = OnceLock::new();
+    static DONE: OnceLock<bool> = OnceLock::new();
     let root = root();
-    let built = BUILT.get_or_init(|| {
+    let built = DONE.get_or_init(|| {
+        if std::env::var_os(BUILT).is_some() {
+            return true;
+        }
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(cargo);
         command.current_dir(&root).args(["build", "--release", "--quiet", "--workspace", "--bins"]);

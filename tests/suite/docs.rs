@@ -1,15 +1,20 @@
 //! What the documents tell people to type works: every option exists, and what takes seconds is played, with small budgets and in a folder
 //! of its own.
 
-use std::collections::BTreeSet;
+mod links;
+mod made;
+mod prose;
+
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use end_to_end::{files, program, root, stderr};
+use serde_json::Value;
 
 /// Verbs whose work takes minutes and is done by other tests: here they only have to accept their options.
-const PLAYED_ELSEWHERE: [&str; 4] = ["bench", "calibrate", "diagnose", "diagnose-benchmark"];
+const PLAYED_ELSEWHERE: [&str; 5] = ["bench", "calibrate", "diagnose", "diagnose-benchmark", "docs"];
 /// Verbs of `cargo xtask` that are no programs of ours, or need what a machine need not have.
-const NOT_HERE: [&str; 3] = ["ci", "docs", "rerun"];
+const NOT_HERE: [&str; 2] = ["ci", "rerun"];
 
 /// Lines of a document's code blocks that begin with `cargo xtask`, without their comments.
 fn commands(document: &Path) -> Vec<String> {
@@ -62,26 +67,26 @@ fn is_synopsis(command: &str) -> bool {
         || words(command).iter().any(|word| word.len() > 2 && word.chars().all(|c| c.is_ascii_uppercase() || c == '.'))
 }
 
+/// All documents, relative to the project: those at its root, and every page below `docs/`.
 fn documents() -> Vec<PathBuf> {
-    let folder = root().join("docs/src");
-    let pages = files(&folder).into_iter().map(|(path, _)| folder.join(path));
-    let mut documents: Vec<PathBuf> = pages.filter(|path| path.extension().is_some_and(|e| e == "md")).collect();
-    documents.extend([root().join("README.md"), root().join("CONTRIBUTING.md")]);
-    documents.sort();
+    let at_root = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md"].map(PathBuf::from);
+    let mut documents: Vec<PathBuf> = at_root.into_iter().filter(|path| root().join(path).exists()).collect();
+    let pages = files(&root().join("docs")).into_iter().map(|(path, _)| Path::new("docs").join(path));
+    documents.extend(pages.filter(|path| path.extension().is_some_and(|end| end == "md")));
     documents
 }
 
 #[test]
 fn every_option_in_the_documents_exists() {
+    let options = options();
     let mut checked = 0;
     for document in documents() {
-        for command in commands(&document).into_iter().chain(mentioned(&document)) {
+        for command in commands(&root().join(&document)).into_iter().chain(mentioned(&root().join(&document))) {
             let verb = words(&command)[0].clone();
-            if NOT_HERE.contains(&verb.as_str()) || verb == "VERB" {
+            if NOT_HERE.contains(&verb.as_str()) || verb.chars().all(|c| c.is_ascii_uppercase()) {
                 continue;
             }
-            let text = help(&verb);
-            let known: BTreeSet<&str> = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '-').collect();
+            let known = options.get(&verb).unwrap_or_else(|| panic!("{}: there is no {verb}", document.display()));
             for option in command.split([' ', '[', ']', '|']).filter(|word| word.starts_with("--")) {
                 let option = option.split('=').next().unwrap_or(option);
                 assert!(known.contains(option), "{}: {verb} has no {option}", document.display());
@@ -100,12 +105,6 @@ fn verbs_of(verb: &str) -> &'static [&'static str] {
         "scenario" => &["check", "schema"],
         _ => &[],
     }
-}
-
-/// The help of a verb, and of its own verbs.
-fn help(verb: &str) -> String {
-    let own = verbs_of(verb);
-    std::iter::once(None).chain(own.iter().copied().map(Some)).map(|own| one_help(verb, own)).collect()
 }
 
 fn one_help(verb: &str, own: Option<&str>) -> String {
@@ -189,6 +188,27 @@ fn examples_that_take_seconds_work() {
     commands.dedup();
     // Tables take minutes; a doctor may find something missing.
     play_commands("examples", commands, &["doctor"], &["--all"]);
+}
+
+/// The options of every verb and of its own verbs.
+fn options() -> BTreeMap<String, BTreeSet<String>> {
+    fn collect(command: &Value, found: &mut BTreeSet<String>) {
+        for option in command["options"].as_array().unwrap() {
+            let usage = option["usage"].as_str().unwrap();
+            let words = usage.split(|c: char| !c.is_ascii_alphanumeric() && c != '-');
+            found.extend(words.filter(|word| word.starts_with("--")).map(String::from));
+        }
+        command["commands"].as_array().unwrap().iter().for_each(|inner| collect(inner, found));
+    }
+    let output = program("xtask").arg("describe").output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let menu: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let verb = |verb: &Value| {
+        let mut found = BTreeSet::from(["--help", "--version"].map(String::from));
+        collect(verb, &mut found);
+        (verb["name"].as_str().unwrap().to_owned(), found)
+    };
+    menu.as_array().unwrap().iter().map(verb).collect()
 }
 
 /// The program behind a verb.
