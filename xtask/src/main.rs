@@ -71,7 +71,7 @@ enum Verb {
     /// Prints all commands with their options as JSON, for the page of commands.
     #[command(hide = true)]
     Describe,
-    /// Runs exactly what CI runs: formatting, lints, all tests.
+    /// Runs exactly what CI runs: formatting, lints, all tests; says which were skipped and which are slow.
     #[command(after_help = "Examples:\n  cargo xtask ci\n  cargo xtask ci --all-features")]
     Ci(ci::Options),
 }
