@@ -3,7 +3,7 @@
 pub(crate) mod help;
 
 use std::path::Path;
-use std::process::{Command as Process, ExitCode};
+use std::process::{Command as Process, ExitCode, Stdio};
 
 use anyhow::Result;
 use clap::{Command, CommandFactory as _};
@@ -101,8 +101,10 @@ fn menu(path: impl Fn(&str) -> std::path::PathBuf) -> (Command, Vec<String>) {
 
 /// A command as the help of its program describes it.
 fn described(program: &Path, name: &str, commands: &[&str], about: &str) -> Option<Command> {
-    let output =
-        Process::new(program).args(commands).arg("-h").output().ok().filter(|output| output.status.success())?;
+    // Without a terminal, whose width would decide where lines break.
+    let mut process = Process::new(program);
+    let output = process.args(commands).arg("-h").stdin(Stdio::null()).env_remove("COLUMNS").output();
+    let output = output.ok().filter(|output| output.status.success())?;
     let help = help::parse(&String::from_utf8_lossy(&output.stdout));
     let mut command = help.command(name, about);
     if commands.len() < DEPTH {

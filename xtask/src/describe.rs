@@ -1,6 +1,6 @@
 //! `xtask describe`: all commands with their options as JSON, from what the programs print as their help. The page of commands is made from it.
 
-use std::process::{Command as Process, ExitCode};
+use std::process::{Command as Process, ExitCode, Stdio};
 
 use anyhow::{Context as _, Result, bail};
 use clap::{Command, CommandFactory as _};
@@ -34,9 +34,9 @@ fn described(verb: &Command) -> Result<Value> {
         bail!("{}: expected the program, built by `cargo build --release --workspace --bins`", program.display());
     } else if behind {
         // Built for those alone who ask for it.
-        of_help(name, &Help::default(), Vec::new())
+        of_help(name, &Help::default(), &[])
     } else {
-        of_help(name, &help::parse(&verb.clone().render_long_help().to_string()), Vec::new())
+        of_help(name, &help::parse(&verb.clone().render_long_help().to_string()), &[])
     };
     value["about"] = about.into();
     if value["example"].is_null() {
@@ -46,7 +46,9 @@ fn described(verb: &Command) -> Result<Value> {
 }
 
 fn of_program(program: &std::path::Path, name: &str, commands: &[&str]) -> Result<Value> {
-    let output = Process::new(program).args(commands).arg("--help").output();
+    // Without a terminal, whose width would decide where lines break.
+    let mut process = Process::new(program);
+    let output = process.args(commands).arg("--help").stdin(Stdio::null()).env_remove("COLUMNS").output();
     let output = output.with_context(|| format!("cannot run {}", program.display()))?;
     if !output.status.success() {
         bail!("{} {} --help fails", program.display(), commands.join(" "));
@@ -58,10 +60,10 @@ fn of_program(program: &std::path::Path, name: &str, commands: &[&str]) -> Resul
             inner.push(of_program(program, command, &[commands, &[command.as_str()]].concat())?);
         }
     }
-    Ok(of_help(name, &help, inner))
+    Ok(of_help(name, &help, &inner))
 }
 
-fn of_help(name: &str, help: &Help, commands: Vec<Value>) -> Value {
+fn of_help(name: &str, help: &Help, commands: &[Value]) -> Value {
     let entry = |(usage, about): (String, String)| json!({ "usage": usage, "about": about });
     let options: Vec<Value> = help.usages().map(entry).collect();
     let arguments: Vec<Value> = help.arguments.iter().cloned().map(entry).collect();
