@@ -107,6 +107,26 @@ fn programs_that_are_built_one_by_one_share_their_dependencies_and_do_without_bu
     }
 }
 
+/// CI compiles the tests, and the programs that they run. A crate that tests want with another feature would be compiled twice, and with it all of ours
+/// that depend on it: that took minutes, when the library of benchmarks wanted two more of clap's.
+#[test]
+fn tests_and_programs_share_their_dependencies() {
+    let tree = |edges: &str| -> BTreeMap<String, BTreeSet<String>> {
+        let options = ["--prefix", "none", "--no-dedupe", "--format", "{p}|{f}"];
+        let mut tree = BTreeMap::<String, BTreeSet<String>>::new();
+        for line in cargo(&[&["tree", "--workspace", "--edges", edges][..], &options].concat()).lines() {
+            let Some((name, features)) = line.split_once('|') else { continue };
+            tree.entry(name.into()).or_default().insert(features.into());
+        }
+        tree
+    };
+    let (programs, tests) = (tree("normal,build"), tree("normal,build,dev"));
+    assert!(programs.len() > 150, "{} crates", programs.len());
+    for (name, features) in &programs {
+        assert_eq!(tests.get(name), Some(features), "{name}");
+    }
+}
+
 /// All source files below a folder, with their text.
 fn sources(folder: &Path) -> Vec<(PathBuf, String)> {
     let rust = |path: &PathBuf| path.extension().is_some_and(|end| end == "rs");
