@@ -58,12 +58,24 @@ enum What {
     /// Speed, returns and exact values of the search on the standard problems.
     #[command(after_help = "Examples:\n  cargo xtask bench planner --quick")]
     Planner {
-        /// Episodes with 2^10 simulations a move; half as many with 2^13, a quarter with 2^15.
+        /// Episodes a row; of RockSample(7, 8), (11, 11) and Tag with 2^10 simulations a move, half as many with 2^13, a quarter with 2^15.
         #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=100_000))]
         episodes: u32,
-        /// Only 2^10 simulations a move.
+        /// Only 2^10 simulations a move of RockSample(7, 8), (11, 11) and Tag.
         #[arg(long)]
         quick: bool,
+        /// Only this row of the large and continuous problems: light_dark, rocksample_15_15, laser_tag, vdp_tag or sub_hunt. May be given again.
+        #[arg(long = "only", value_name = "ROW")]
+        only: Vec<String>,
+        /// Root seed of these rows. Their options were chosen on 1001 to 1003.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Overrides an option of these rows: row.key=value.
+        #[arg(long = "set", value_name = "ROW.KEY=VALUE")]
+        set: Vec<String>,
+        /// Writes the results there, a row as soon as it is done. A row with the same seed, episodes and options is not played again.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
         /// Prints one JSON object.
         #[arg(long)]
         json: bool,
@@ -131,9 +143,12 @@ fn run(arguments: &Arguments) -> Result<()> {
             let result = belief::run(&root, &task, |text| program::say!("{text}"))?;
             program::out!("{}", serde_json::to_string_pretty(&result)?);
         }
-        What::Planner { episodes, quick, json } => {
+        What::Planner { episodes, quick, only, seed, set, out, json } => {
             let effort = planner::Effort { episodes: *episodes, quick: *quick };
-            let result = planner::run(effort, |text| program::say!("{text}"))?;
+            let task = planner::Task { effort, seed: *seed, only: only.clone(), set: set.clone() };
+            let open = |folder: &PathBuf| planner::Results::open(folder, scenario::commit(&root));
+            let results = out.as_ref().map(open).transpose()?;
+            let result = planner::run(&task, results.as_ref(), |text| program::say!("{text}"))?;
             if *json {
                 program::out!("{result}");
             } else {

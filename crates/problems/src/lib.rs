@@ -18,18 +18,26 @@
 //! assert_eq!(step.reward, -100.0);
 //! ```
 
+pub mod beams;
 pub mod bits;
 pub mod episode;
+pub mod finite;
 pub mod hmm;
+pub mod laser_tag;
 pub mod light_dark;
 pub mod linear_gaussian;
 pub mod rock_sample;
 pub mod static_parameter;
+pub mod sub_hunt;
 pub mod tag;
 pub mod tiger;
+pub mod vdp_tag;
 
 pub use episode::{Episode, InitialState, Particles};
+pub use laser_tag::LaserTag;
 pub use light_dark::LightDark;
 pub use rock_sample::RockSample;
+pub use sub_hunt::SubHunt;
 pub use tag::Tag;
 pub use tiger::Tiger;
+pub use vdp_tag::VdpTag;

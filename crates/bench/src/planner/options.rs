@@ -1,0 +1,94 @@
+//! What can be chosen for a row: of the search, of the belief, of the actions.
+
+use anyhow::{Context as _, Result, bail};
+use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, RolloutDepth};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+/// What a new leaf of a search is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Leaf {
+    /// What its state is worth to somebody who knows it: value iteration.
+    FullInformation,
+    /// What a random policy returns.
+    Random,
+    /// What the problem's heuristic returns.
+    Heuristic,
+}
+
+/// Options of a row.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Options {
+    /// The search.
+    pub planner: Config,
+    /// What its leaves are worth.
+    pub leaf: Leaf,
+    /// Most actions of an episode.
+    pub horizon: usize,
+    /// Particles of a belief; 0 where the belief is exact.
+    pub particles: usize,
+    /// VDP Tag: directions around the circle among the actions; 0 where the actions are those of the problem.
+    pub directions: usize,
+    /// VDP Tag: actions that make for where a particle of the belief will be.
+    pub aims: usize,
+}
+
+impl Options {
+    /// Widening with the value of full information at the leaves, and an exact belief.
+    pub(super) fn widening(simulations: usize, exploration: f64, depth: usize, factor: f64, exponent: f64) -> Self {
+        let planner = Config {
+            budget: Budget::Simulations(simulations),
+            exploration: Exploration::Fixed(exploration),
+            depth,
+            rollout_depth: RolloutDepth::Actions(0),
+            action_priors: ActionPriors::Off,
+            observations: Observations::Widening { factor, exponent },
+            backup: Backup::Mean,
+            nodes: 1 << 24,
+            trees: 1,
+            threads: 1,
+        };
+        Self { planner, leaf: Leaf::FullInformation, horizon: 100, particles: 0, directions: 0, aims: 0 }
+    }
+
+    /// With the entry `key` (dots lead into tables) set to a TOML value.
+    ///
+    /// # Errors
+    ///
+    /// An unknown key, or a value that does not fit.
+    pub(super) fn with(&self, key: &str, value: &str) -> Result<Self> {
+        let given: toml::Table = toml::from_str(&format!("value = {value}"))
+            .with_context(|| format!("the value of {key} is no TOML: {value}"))?;
+        let mut options = serde_json::to_value(self)?;
+        let mut at = &mut options;
+        for part in key.split('.') {
+            match at.get_mut(part) {
+                Some(next) => at = next,
+                None => bail!("there is no option {key}: expected one of {}", json!(self)),
+            }
+        }
+        *at = serde_json::to_value(&given["value"])?;
+        let options: Value = options;
+        serde_json::from_value(options).with_context(|| format!("{key} cannot be {value}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn entries_are_set_by_their_path_and_others_refused() {
+        let options = Options::widening(1000, 90.0, 20, 5.0, 0.1);
+        let changed =
+            options.with("planner.exploration", "{ fixed = 30.0 }").unwrap().with("leaf", "\"random\"").unwrap();
+        assert_eq!(changed.planner.exploration, Exploration::Fixed(30.0));
+        assert_eq!((changed.leaf, changed.planner.depth), (Leaf::Random, 20));
+        let unknown = options.with("planner.deep", "3").unwrap_err().to_string();
+        assert!(unknown.starts_with("there is no option planner.deep"), "{unknown}");
+        assert_eq!(options.with("particles", "-3").unwrap_err().to_string(), "particles cannot be -3");
+        assert_eq!(options.with("leaf", "no").unwrap_err().to_string(), "the value of leaf is no TOML: no");
+    }
+}

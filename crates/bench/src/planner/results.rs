@@ -1,0 +1,95 @@
+//! The folder of results: one file a row, so that a run that was stopped goes on where it was, and the table of all of them.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use serde_json::{Map, Value, json};
+use whole_file::Existing;
+
+use super::contest::Row;
+use super::table::table;
+
+/// Name of the table and of the object of all rows, without the ending.
+pub const NAME: &str = "planner";
+
+/// Most bytes of a row's file.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// A folder of results.
+#[derive(Clone, Debug)]
+pub struct Results {
+    folder: PathBuf,
+    commit: String,
+}
+
+impl Results {
+    /// Makes the folder where it is missing. `commit` is noted beside each row.
+    ///
+    /// # Errors
+    ///
+    /// Where the folder cannot be made.
+    pub fn open(folder: &Path, commit: String) -> Result<Self> {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        Ok(Self { folder: folder.to_path_buf(), commit })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(format!("{name}.json"))
+    }
+
+    /// What the folder has of a row with the same task.
+    ///
+    /// # Errors
+    ///
+    /// A file that is no result of this command.
+    pub(super) fn of(&self, row: &Row) -> Result<Option<Value>> {
+        let path = self.path(row.name());
+        if !path.exists() {
+            return Ok(None);
+        }
+        let bytes = whole_file::read(&path, MOST_BYTES)?;
+        let value: Value = serde_json::from_slice(&bytes)
+            .with_context(|| format!("{} is no result of this benchmark: move it away", path.display()))?;
+        Ok((value["task"] == row.task()).then_some(value))
+    }
+
+    /// Writes a row, in place of what was there for another task.
+    ///
+    /// # Errors
+    ///
+    /// Where the file cannot be written.
+    pub(super) fn add(&self, row: &Row, value: &Value) -> Result<()> {
+        let mut value = value.clone();
+        value["commit"] = json!(self.commit);
+        whole_file::write(&self.path(row.name()), &pretty(&value)?, Existing::Replace)?;
+        Ok(())
+    }
+
+    /// Writes all rows as one object and as a table.
+    ///
+    /// # Errors
+    ///
+    /// Where a file cannot be written.
+    pub(super) fn finish(&self, result: &Value) -> Result<()> {
+        let mut all: Map<String, Value> = result.as_object().cloned().unwrap_or_default();
+        let whole = self.path(NAME);
+        if whole.exists() {
+            let before = whole_file::read(&whole, MOST_BYTES)?;
+            let before: Value = serde_json::from_slice(&before)
+                .with_context(|| format!("{} is no result of this benchmark: move it away", whole.display()))?;
+            for (name, row) in before.as_object().into_iter().flatten() {
+                all.entry(name).or_insert_with(|| row.clone());
+            }
+        }
+        let all = Value::Object(all);
+        whole_file::write(&whole, &pretty(&all)?, Existing::Replace)?;
+        whole_file::write(&whole.with_extension("md"), table(&all).as_bytes(), Existing::Replace)?;
+        Ok(())
+    }
+}
+
+fn pretty(value: &Value) -> Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
