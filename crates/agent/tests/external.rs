@@ -108,7 +108,7 @@ fn every_wrong_answer_names_its_message_and_field() {
     let problem = problem("jaco");
     let cases: [(&str, &[&str]); 34] = [
         ("act-nonsense", &["`act`", "expected"]),
-        ("act-empty", &["`act`", "EOF"]),
+        ("act-empty", &["`act`", "the text ends before it is complete"]),
         ("act-array", &["`act`", "expected"]),
         ("act-deep", &["`act`"]),
         ("act-bytes", &["`act`", "UTF-8"]),

@@ -1,6 +1,6 @@
 //! `cargo xtask calibrate`: compares what a prior says on held-out episodes with what was true.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, anyhow};
@@ -8,7 +8,7 @@ use clap::Parser;
 use dataset::Reader;
 use prior::calibrate::{Calibration, calibrate};
 use prior::features::{self, ActionInput};
-use prior::{Checkpoint, Episode, Models, Sequence, TrainConfig, write_atomically};
+use prior::{Checkpoint, Episode, Inference, Layout, Models, Sequence, TrainConfig, write_atomically};
 use program::typed;
 
 /// Compares what a prior says with the truth of episodes that it was not trained on.
@@ -79,28 +79,9 @@ fn run(arguments: &Arguments) -> Result<()> {
             manifest.seed
         ));
     }
-    let memoryless = match &arguments.memoryless {
-        Some(folder) => {
-            let memoryless = Checkpoint::load(folder, Some(&layout))?;
-            let file = folder.join("prior.json");
-            if memoryless.network.memory {
-                return Err(anyhow!("{}: network.memory is true, expected false", file.display()));
-            }
-            // A peer: the same but for its memory.
-            let (ours, theirs) = (&checkpoint.facts, &memoryless.facts);
-            let network = ours.config.network.clone();
-            let config = TrainConfig { network, ..theirs.config.clone() };
-            if ours.data_blake3 != theirs.data_blake3 || ours.seed != theirs.seed || ours.config != config {
-                return Err(anyhow!(
-                    "{}: was trained on other data, with another seed or other settings, expected those of {}",
-                    file.display(),
-                    manifest_file.display()
-                ));
-            }
-            Some(memoryless.inference()?)
-        }
-        None => None,
-    };
+    let memoryless =
+        arguments.memoryless.as_deref().map(|folder| memoryless_peer(folder, &checkpoint, &layout, &manifest_file));
+    let memoryless = memoryless.transpose()?;
     let recorded = reader.episodes()?;
     let sequences: Vec<Sequence> =
         recorded.iter().map(|episode| features::sequence(&layout, episode)).collect::<Result<_, _>>()?;
@@ -127,24 +108,44 @@ fn run(arguments: &Arguments) -> Result<()> {
     } else {
         print(&calibration);
         program::say!("written to {}", typed(&out.join("calibration.json")));
-        let words = [
-            "cargo",
-            "xtask",
-            "eval",
-            "--domain",
-            "D4",
-            "--robot",
-            robot,
-            "--prior",
-            &typed(&folder),
-            "--trials",
-            "10",
-        ];
-        if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
-            program::next(&[(words.map(String::from).to_vec(), "plays with it")]);
-        }
+        suggest_next(&root, robot, &folder);
     }
     Ok(())
+}
+
+/// The network without memory that is compared with `checkpoint`: the same data, seed and settings, but for its memory.
+fn memoryless_peer(
+    folder: &Path,
+    checkpoint: &Checkpoint,
+    layout: &Layout,
+    checkpoint_file: &Path,
+) -> Result<Inference> {
+    let memoryless = Checkpoint::load(folder, Some(layout))?;
+    let file = folder.join("prior.json");
+    if memoryless.network.memory {
+        return Err(anyhow!("{}: network.memory is true, expected false", file.display()));
+    }
+    let (ours, theirs) = (&checkpoint.facts, &memoryless.facts);
+    let network = ours.config.network.clone();
+    let config = TrainConfig { network, ..theirs.config.clone() };
+    if ours.data_blake3 != theirs.data_blake3 || ours.seed != theirs.seed || ours.config != config {
+        return Err(anyhow!(
+            "{}: was trained on other data, with another seed or other settings, expected those of {}",
+            file.display(),
+            checkpoint_file.display()
+        ));
+    }
+    Ok(memoryless.inference()?)
+}
+
+/// Plays with the network, where the arm is one of the project's.
+fn suggest_next(root: &Path, robot: &str, folder: &Path) {
+    let folder = typed(folder);
+    let options = ["--domain", "D4", "--robot", robot, "--prior", &folder, "--trials", "10"];
+    let words = ["cargo", "xtask", "eval"].iter().chain(&options).map(ToString::to_string).collect();
+    if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
+        program::next(&[(words, "plays with it")]);
+    }
 }
 
 fn print(calibration: &Calibration) {
