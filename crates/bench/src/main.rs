@@ -67,7 +67,7 @@ enum What {
         /// Only this row of the large and continuous problems: light_dark, rocksample_15_15, laser_tag, vdp_tag or sub_hunt. May be given again.
         #[arg(long = "only", value_name = "ROW")]
         only: Vec<String>,
-        /// Root seed of these rows. Their options were chosen on 1001 to 1003.
+        /// Root seed of these rows. Options are chosen on 1001 to 1003.
         #[arg(long, default_value_t = 1)]
         seed: u64,
         /// Overrides an option of these rows: row.key=value.

@@ -1,9 +1,14 @@
 //! Large and continuous problems beside the best that was published on them: LightDark, RockSample(15, 15), LaserTag, VDP Tag and Sub Hunt.
 //!
 //! Published searches had 1 s a move. Ours have a fixed number of simulations, so that the same seed gives the same result, and the time that they
-//! took is reported. Options were chosen on [`TUNING_SEEDS`]; what is reported is from another seed.
+//! took is reported. [`TUNING_SEEDS`] are kept for the choice of options; what is reported is from another seed. So far only two options were
+//! chosen, on 1001: the classes of LightDark and the rollouts of VDP Tag. LaserTag and Sub Hunt have the published widening and exploration.
 //!
-//! Beliefs are exact where the states can be listed, and for RockSample, whose rocks are independent. VDP Tag has the 10,000 particles of the published experiments.
+//! Beliefs are exact where the states can be listed, and for RockSample, whose rocks are independent. VDP Tag has the 10,000 particles of the
+//! published experiments.
+//!
+//! Only LightDark is level with the best that was published. The other searches take 3 to 4 ms a move, where the published ones took 1 s, and their options
+//! are not tuned. Whether more simulations or other options close the gap has not been measured.
 
 use anyhow::{Context as _, Result, bail, ensure};
 use planner::{ActionPriors, Observations, RolloutDepth};
@@ -15,7 +20,7 @@ use super::options::{Leaf, Options};
 use super::play::{self, Played};
 use super::{Effort, Task};
 
-/// Root seeds on which options were chosen. No result may come from them.
+/// Root seeds on which options may be chosen. No result may come from them.
 pub const TUNING_SEEDS: [u64; 3] = [1001, 1002, 1003];
 
 /// A problem with published returns.
@@ -247,16 +252,12 @@ mod tests {
 
     #[test]
     fn every_row_plays_and_says_what_it_did() {
-        let small: Vec<String> =
-            PROBLEMS.iter().map(|p| format!("{}.planner.budget={{ simulations = 20 }}", p.name())).collect();
-        let mut set: Vec<&str> = small.iter().map(String::as_str).collect();
-        set.extend(["vdp_tag.particles=50", "vdp_tag.horizon=5", "rocksample_15_15.horizon=5"]);
         // Sub Hunt solves a million states first: `problems` tests what it plays with.
-        let rows = rows(&task(&["light_dark", "rocksample_15_15", "laser_tag", "vdp_tag"], &set[..4])).unwrap_err();
-        assert!(rows.to_string().contains("no row sub_hunt") || rows.to_string().contains("--set"), "{rows:#}");
-        set.retain(|entry| !entry.starts_with("sub_hunt"));
-        let chosen = task(&["light_dark", "rocksample_15_15", "laser_tag", "vdp_tag"], &set);
-        for row in super::rows(&chosen).unwrap() {
+        let names = ["light_dark", "rocksample_15_15", "laser_tag", "vdp_tag"];
+        let mut set: Vec<String> = names.iter().map(|n| format!("{n}.planner.budget={{ simulations = 20 }}")).collect();
+        set.extend(["vdp_tag.particles=50", "vdp_tag.horizon=5", "rocksample_15_15.horizon=5"].map(String::from));
+        let chosen = task(&names, &set.iter().map(String::as_str).collect::<Vec<_>>());
+        for row in rows(&chosen).unwrap() {
             let value = row.play(&mut |_| {}).unwrap();
             let returns = &value["returns"]["20"];
             assert!(returns["n"] == 2 && returns["mean"].as_f64().is_some_and(f64::is_finite), "{value}");
