@@ -116,7 +116,8 @@ fn tests_and_programs_share_their_dependencies() {
         let mut tree = BTreeMap::<String, BTreeSet<String>>::new();
         for line in cargo(&[&["tree", "--workspace", "--edges", edges][..], &options].concat()).lines() {
             let Some((name, features)) = line.split_once('|') else { continue };
-            tree.entry(name.into()).or_default().insert(features.into());
+            // A crate that its own tests depend on is marked as seen before.
+            tree.entry(name.into()).or_default().insert(features.trim_end_matches(" (*)").into());
         }
         tree
     };

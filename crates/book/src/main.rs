@@ -10,7 +10,7 @@ use whole_file::Existing;
 
 /// Builds the book and the API docs into one folder.
 #[derive(Debug, Parser)]
-#[command(name = "docs", version, after_help = "Example: cargo xtask docs --no-api")]
+#[command(name = "docs", version, after_help = "Examples:\n  cargo xtask docs --no-api")]
 struct Arguments {
     /// Folder of the documentation [default: target/docs].
     #[arg(long)]

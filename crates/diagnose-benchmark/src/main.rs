@@ -68,8 +68,8 @@ struct Arguments {
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask diagnose-benchmark --sets 4 --none 2 --unknown 2 --pairs 0 --arms 0 --out runs/diagnose-benchmark/small
-  cargo xtask diagnose-benchmark --sets 4 --none 2 --unknown 2 --pairs 0 --arms 0 --out runs/diagnose-benchmark/small --score-only";
+  cargo xtask diagnose-benchmark --sets 4 --none 2 --unknown 2 --pairs 0 --arms 0
+  cargo xtask diagnose-benchmark --sets 4 --none 2 --unknown 2 --pairs 0 --arms 0 --score-only";
 
 /// What went wrong after the input was found to be good.
 const FAILED: Failed = Failed::new("the benchmark stopped, finished sets are kept");

@@ -55,8 +55,8 @@ struct Arguments {
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask diagnose --measured tests/data/mujoco-logs/logs/set-003 --out runs/diagnose/first
-  cargo xtask diagnose --measured tests/data/mujoco-logs/logs/set-003 --model runs/diagnose/first/model.toml --out runs/diagnose/again";
+  cargo xtask diagnose --list-effects
+  cargo xtask diagnose --measured tests/data/mujoco-logs/logs/set-003 --out runs/diagnose/first";
 
 fn main() -> ExitCode {
     // 2 is bad input; a disk that refuses is a failure.

@@ -198,7 +198,7 @@ fn joints_suffice_for_an_arm_and_actions_alone_do_not_say_where_it_went() {
     let folder = tempfile::tempdir().unwrap();
     let run = |log: &Path| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_diagnose"));
-        command.arg("--measured").arg(log).arg("--out").arg(folder.path().join("out")).arg("--root").arg(root());
+        command.arg("--measured").arg(log).arg("--out").arg(log.with_file_name("out")).arg("--root").arg(root());
         command.arg("--json").output().unwrap()
     };
     let output = run(&of_an_arm(folder.path(), true));

@@ -139,7 +139,7 @@ fn a_tool_of_another_size_than_the_log_says_is_told_by_when_it_touches() {
         description.contains("before simulated ones") && description.contains("the sizes of tool"),
         "{description}"
     );
-    assert!(found.next_experiment.starts_with("Measure tool and object"), "{}", found.next_experiment);
+    assert!(found.next_experiment.starts_with("Measure the tool and the object"), "{}", found.next_experiment);
 }
 
 #[test]

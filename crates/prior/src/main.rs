@@ -73,7 +73,7 @@ struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask train --quick
-  cargo xtask train --robot jaco --epochs 20 --data runs/data/jaco-small --out runs/priors/jaco-small";
+  cargo xtask train --robot jaco --epochs 20 --data runs/data/jaco --out runs/priors/jaco-20";
 
 /// What went wrong after the input was found to be good.
 const FAILED: Failed = Failed::new("the training stopped, finished epochs are kept");

@@ -72,7 +72,7 @@ impl Layers {
         }
         let scenario: Scenario = serde_path_to_error::deserialize(Value::Table(merged)).map_err(|error| {
             let mut key = error.path().to_string();
-            let message = error.into_inner().to_string();
+            let message = error.into_inner().message().to_owned();
             let message = message.trim();
             // serde reports an unknown or a missing key on its table: the key itself stands in the message.
             let named = ["unknown field `", "missing field `"].iter().find_map(|start| message.strip_prefix(start));

@@ -43,7 +43,7 @@ const FOUND: [(&str, &str); 13] = [
     ("map", "a table"),
     ("unit value", "nothing"),
     ("Option value", "nothing"),
-    ("null", "nothing"),
+    ("null", "null"),
     ("unit variant", "a name"),
     ("newtype variant", "a table"),
     ("enum", "a name or a table"),
@@ -146,10 +146,7 @@ mod tests {
             ("invalid type: integer `3`, expected struct Header", "expected a table, found 3"),
             ("invalid type: map, expected a sequence", "expected a list, found a table"),
             ("invalid type: sequence, expected a string", "expected a text, found a list"),
-            (
-                "invalid type: null, expected f64 at line 3 column 9",
-                "expected a number, found nothing at line 3 column 9",
-            ),
+            ("invalid type: null, expected f64 at line 3 column 9", "expected a number, found null at line 3 column 9"),
             ("invalid length 2, expected an array of length 3", "expected a list of 3, found 2"),
             ("invalid length 1, expected struct Range with 2 elements", "expected a list of 2, found 1"),
             (

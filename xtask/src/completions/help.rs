@@ -71,9 +71,9 @@ pub(crate) fn parse(text: &str) -> Help {
         if entry.is_empty() {
             continue;
         }
-        if let Some(at) = entry.find("cargo xtask ").filter(|_| section != "Options:" || indent == 0) {
+        if entry.starts_with("cargo xtask ") && section != "Options:" {
             // What follows two spaces is a remark.
-            help.example.get_or_insert(entry[at..].split("  ").next().unwrap_or_default().trim().into());
+            help.example.get_or_insert(entry.split("  ").next().unwrap_or_default().trim().into());
         }
         if indent == 0 {
             section = entry;
@@ -179,7 +179,8 @@ Options:
   -h, --help
           Print help
 
-Example: cargo xtask scenario check D4
+Examples:
+  cargo xtask scenario check D4
 ";
 
     #[test]

@@ -44,7 +44,7 @@ struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask record-log --domain tilted --actions passive --out runs/rehearsal/log
-  cargo xtask record-log --domain D1 --set 'effects.truth=[{ viscous_damping = { coefficient_nspm = 3.0 } }]' --out runs/rehearsal/viscous";
+  cargo xtask record-log --domain D1 --actions designed --out runs/rehearsal/level";
 
 fn main() -> ExitCode {
     program::finish(run(&Arguments::parse()))
