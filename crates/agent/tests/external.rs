@@ -135,7 +135,7 @@ fn every_wrong_answer_names_its_message_and_field() {
         ("act-outcome", &["`act`", "`outcome`", "`won`"]),
         ("act-goal-without-end", &["`act`", "`outcome`", "events.goal true"]),
         ("act-end-without-goal", &["`act`", "`outcome`", "events.goal false"]),
-        ("act-event-number", &["`act`", "`events.large_force`", "boolean"]),
+        ("act-event-number", &["`act`", "`events.large_force`", "expected true or false"]),
         ("act-long", &["`act`", "65536 bytes"]),
         ("act-endless", &["`act`", "65536 bytes"]),
         ("reset-short", &["`reset`", "`observation`", "expected 13 values, found 12"]),

@@ -85,6 +85,14 @@ fn run(arguments: &Arguments) -> Result<bool> {
         engine.check()?;
     }
     whole_file::check_owner(&job.out, "plan.json")?;
+    // A dataset begins with its plan: a manifest without one is somebody else's.
+    let manifest = job.out.join("meta/info.json");
+    if manifest.exists() && !job.out.join("plan.json").exists() {
+        anyhow::bail!(
+            "{}: it lies in a folder without plan.json, which datagen writes first: choose another folder",
+            manifest.display()
+        );
+    }
     job.plan.open(&job.out)?;
     let _lock = Lock::take(&job.out.join("plan.json"))?;
     let missing = job.missing_shards()?;

@@ -299,7 +299,7 @@ mod tests {
         assert_eq!(chosen(&["a"]), [false, false, true, true]);
         assert_eq!(chosen(&["b-surmise", "a-paper-D2"]), [true, true, false, true]);
         let message = plan.chosen(&["c".into()]).unwrap_err().to_string();
-        assert!(message.contains("`c`") && message.contains("a, a-paper, b, b-surmise"), "{message}");
+        assert!(message.contains("--only c:") && message.contains("a, a-paper, b, b-surmise"), "{message}");
     }
 
     #[test]

@@ -23,6 +23,14 @@ pub enum Format {
 }
 
 impl Format {
+    /// What every file of samples begins with.
+    fn begins(self) -> &'static [u8] {
+        match self {
+            Self::Csv => b"episode,",
+            Self::Parquet => b"PAR1",
+        }
+    }
+
     /// Name of the file.
     #[must_use]
     pub fn file_name(self) -> &'static str {
@@ -83,7 +91,8 @@ pub fn read(dir: &Path) -> Result<Log, Error> {
 }
 
 /// Writes a log into the folder `dir`, which is made if it is not there, with `notes` as comments of `log.toml`. The samples come first and
-/// `log.toml` last, each whole or not at all: what has no `log.toml` is unfinished and may be written again.
+/// `log.toml` last, each whole or not at all: samples without `log.toml` are unfinished and may be written again. A file of their name that
+/// does not begin as samples do is somebody else's and stays.
 ///
 /// # Errors
 ///
@@ -98,6 +107,14 @@ pub fn write(dir: &Path, log: &Log, format: Format, notes: &Notes) -> Result<(),
     for taken in [header_path.clone(), dir.join(other.file_name())] {
         if taken.try_exists().map_err(Error::io("look for", &taken))? {
             return Err(Error::Exists { path: taken });
+        }
+    }
+    if path.try_exists().map_err(Error::io("look for", &path))? {
+        let mut begins = Vec::new();
+        let file = File::open(&path).map_err(Error::io("read", &path))?;
+        file.take(8).read_to_end(&mut begins).map_err(Error::io("read", &path))?;
+        if !begins.starts_with(format.begins()) {
+            return Err(Error::Exists { path });
         }
     }
     std::fs::create_dir_all(dir).map_err(Error::io("make the folder", dir))?;

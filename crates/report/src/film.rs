@@ -120,9 +120,9 @@ impl Picture<'_> {
     fn title(&self, canvas: &mut Canvas) {
         let obstacle = self.truth().is_some_and(|truth| truth.obstacle.is_some());
         let text = if obstacle {
-            "Push an object of unknown shape, mass and friction into the goal, past an obstacle that no sensor sees"
+            "Push an object of unknown shape, size, mass and friction into the goal, past an obstacle that no sensor sees"
         } else {
-            "Push an object of unknown shape, mass and friction into the goal"
+            "Push an object of unknown shape, size, mass and friction into the goal"
         };
         canvas.text(text, (MAP.0.0, 26.0), of_type(14.5, Align::Start, Color::INK));
     }
@@ -308,7 +308,7 @@ impl Picture<'_> {
             y += 28.0;
         }
         y += 14.0;
-        canvas.text("90 % intervals of its", (NAMES, y), soft);
+        canvas.text("90 % intervals of the object", (NAMES, y), soft);
         for name in ["mass", "friction"] {
             y += 28.0;
             self.interval_row(canvas, y, name, belief);
