@@ -51,6 +51,20 @@ fn claim(out: &Path) -> Result<()> {
     Ok(())
 }
 
+/// The text of a page of `folder` with the files that it includes named by their whole paths: the stage does not hold them.
+fn included(folder: &Path, text: &str) -> Result<String> {
+    const INCLUDE: &str = "{{#include ";
+    let mut parts = text.split(INCLUDE);
+    let mut changed = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let end = part.find([':', '}']).unwrap_or(part.len());
+        let file = folder.join(part[..end].trim());
+        let file = file.canonicalize().with_context(|| format!("a page includes {}", file.display()))?;
+        changed += &format!("{INCLUDE}{}{}", file.display(), &part[end..]);
+    }
+    Ok(changed)
+}
+
 /// Copies what the pages in a folder of the stage link to outside of the book, and changes the links.
 fn bring_in(root: &Path, stage: &Path, folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(stage.join(folder))? {
@@ -58,7 +72,7 @@ fn bring_in(root: &Path, stage: &Path, folder: &Path) -> Result<()> {
         if stage.join(&path).is_dir() {
             bring_in(root, stage, &path)?;
         } else if path.extension().is_some_and(|end| end == "md") {
-            let text = std::fs::read_to_string(stage.join(&path))?;
+            let text = included(&root.join("docs").join(folder), &std::fs::read_to_string(stage.join(&path))?)?;
             let mut parts = text.split("](");
             let mut changed = parts.next().unwrap_or_default().to_owned();
             for part in parts {
@@ -144,7 +158,7 @@ mod tests {
         write("NOTES.md", "Notes.");
         write(
             "docs/src/one.md",
-            "# One\n\nA page. [An](../../assets/a.svg) and [Notes](../../NOTES.md#x), [no](../../none.md).\n",
+            "# One\n\nA page. [An](../../assets/a.svg) and [Notes](../../NOTES.md#x), [no](../../none.md).\n\n{{#include ../../NOTES.md:1:1}}\n",
         );
         let out = folder.path().join("out");
         for _ in 0..2 {
@@ -153,10 +167,13 @@ mod tests {
         }
         let page = std::fs::read_to_string(out.join("one.html")).unwrap();
         assert!(page.contains("\"project/assets/a.svg\"") && page.contains("\"project/NOTES.txt\""), "{page}");
+        assert!(page.contains("<p>Notes.</p>"), "what lies beside the book is included: {page}");
         assert!(out.join("project/assets/a.svg").is_file() && out.join("project/NOTES.txt").is_file());
         let names: Vec<String> =
             std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         assert!(names.iter().any(|name| name.starts_with("searchindex")), "{names:?}");
+        let missing = included(folder.path(), "{{#include none.md}}").unwrap_err().to_string();
+        assert!(missing.contains("includes") && missing.contains("none.md"), "{missing}");
         copy_folder(&out, &folder.path().join("copy/here")).unwrap();
         assert!(folder.path().join("copy/here/one.html").is_file());
         write("docs/src/SUMMARY.md", "# Summary\n\n- [Two](two.md)\n");
