@@ -43,7 +43,7 @@ pub enum Impossible {
 #[non_exhaustive]
 pub enum EffectError {
     /// No effect has this name.
-    #[error("effect {name:?} does not exist: {known} do")]
+    #[error("there is no effect {name:?}, expected one of {known}")]
     Unknown {
         /// The name.
         name: String,

@@ -1,5 +1,5 @@
-//! What every program of the project does: it prints where a closed pipe is no panic, ends with a code that says why, says what to do next,
-//! and stops at an interrupt.
+//! What every program of the project does: it reads its command line, prints where a closed pipe is no panic, ends with a code that says
+//! why, says what to do next, and stops at an interrupt.
 //!
 //! Exit codes: 0 done; 1 failed although the input was good ([`Failed`]); 2 bad input; 130 interrupted.
 //!
@@ -13,12 +13,14 @@
 //! assert_eq!(program::code(&anyhow::anyhow!("--trials: expected at least 1, found 0")), 2);
 //! ```
 
+mod arguments;
 mod ending;
 mod next;
 mod terminal;
 #[cfg(feature = "long-work")]
 mod work;
 
+pub use arguments::parse;
 pub use ending::{Failed, code, end, finish, resumable};
 pub use next::{next, typed};
 pub use terminal::{complain, print, say, show};

@@ -99,7 +99,18 @@ impl Layers {
         let found = (1..=parts.len()).rev().find_map(|length| self.last_with(&parts[..length]));
         match found {
             Some(source) => source.name.clone(),
-            None => self.0.iter().map(|layer| layer.source.name.as_str()).collect::<Vec<_>>().join(" + "),
+            None => {
+                // Whose it is to say; all layers where it is nobody's.
+                let whose = match parts[0] {
+                    "name" => Some(LayerKind::Domain),
+                    "preset" => Some(LayerKind::Preset),
+                    "robot" => Some(LayerKind::Robot),
+                    _ => None,
+                };
+                let asked =
+                    self.0.iter().map(|layer| &layer.source).filter(|s| whose.is_none_or(|kind| s.layer == kind));
+                asked.map(|source| source.name.as_str()).collect::<Vec<_>>().join(" + ")
+            }
         }
     }
 
@@ -192,6 +203,28 @@ mod tests {
         let version = message("version=9");
         assert!(version.contains("version"), "{version}");
         assert!(message("nonsense").contains("key=value"));
+    }
+
+    #[test]
+    fn a_key_that_is_missing_is_asked_of_the_file_that_has_to_say_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("mine.toml");
+        let mine = file.display().to_string();
+        let root = find_root(env!("CARGO_MANIFEST_DIR").as_ref()).unwrap();
+        let nominal = Selection::new(&root);
+        let cases = [
+            ("name", "d1", Selection { domain: mine.clone(), ..nominal.clone() }),
+            ("preset", "presets/surmise", Selection { preset: mine.clone(), ..nominal.clone() }),
+            ("robot", "robots/sawyer", Selection { robot: mine.clone(), ..nominal }),
+        ];
+        for (key, original, selection) in cases {
+            let text = std::fs::read_to_string(root.join("scenarios").join(original).with_extension("toml")).unwrap();
+            let mut table: toml::Table = toml::from_str(&text).unwrap();
+            table.remove(key).unwrap();
+            std::fs::write(&file, table.to_string()).unwrap();
+            let message = selection.load().unwrap_err().to_string();
+            assert_eq!(message, format!("{mine}: key `{key}`: `{key}` is missing"));
+        }
     }
 
     #[test]

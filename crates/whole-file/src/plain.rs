@@ -1,7 +1,7 @@
 //! What a decoder says of a file, in words that a person reads who does not know Rust.
 
 /// What decoders call the types that they expect, and what those are for who writes a file. Longer names come before those that they begin with.
-const EXPECTED: [(&str, &str); 27] = [
+const EXPECTED: [(&str, &str); 28] = [
     ("usize", WHOLE),
     ("u8", WHOLE),
     ("u16", WHOLE),
@@ -27,6 +27,7 @@ const EXPECTED: [(&str, &str); 27] = [
     ("unit", "nothing"),
     ("string or map", "a name, or a table with one key"),
     ("wanted string or table", "a name, or a table with one key"),
+    ("string only", "a name, or a table with one key"),
     ("a character", "one character"),
     ("a string containing one floating point value", "a number"),
 ];
@@ -49,6 +50,40 @@ const FOUND: [(&str, &str); 13] = [
     ("enum", "a name or a table"),
 ];
 
+/// Sentences of decoders of JSON, TOML, XML and numbers that say nothing to who writes a file.
+const SENTENCES: [(&str, &str); 27] = [
+    // A name where a table was: what is there, the decoder does not say.
+    ("invalid type: unit variant, expected string only", "expected a name, or a table with one key"),
+    ("wanted exactly 1 element, found 0 elements", "expected a table with one key, found an empty one"),
+    ("wanted exactly 1 element, more than 1 element", "expected a table with one key, found several keys"),
+    ("string values must be quoted, expected literal string", "expected a text in quotes"),
+    ("unexpected key or value, expected newline, `#`", "expected a new line or a comment behind the value"),
+    ("expected value", VALUE),
+    ("expected ident", "expected true, false or null"),
+    ("key must be a string", "expected a key in double quotes"),
+    ("trailing characters", "expected nothing behind the end of the JSON"),
+    ("trailing comma", "expected no comma before the end of a list or table"),
+    ("control character (\\u0000-\\u001F) found while parsing a string", "expected a text without control characters"),
+    ("invalid escape", ESCAPE),
+    ("lone leading surrogate in hex escape", ESCAPE),
+    ("unexpected end of hex escape", ESCAPE),
+    ("invalid unicode code point", "expected UTF-8 text"),
+    ("invalid number", "expected a number"),
+    ("number out of range", "expected a smaller number, found one out of range"),
+    ("recursion limit exceeded", "expected lists and tables that are not nested as deep"),
+    ("No elements found", "expected complete XML, the text ends before its outermost element does"),
+    ("Elements not properly nested", "expected XML, where elements end in the order in which they began"),
+    ("invalid digit found in string", "expected a whole number"),
+    ("cannot parse integer from empty string", "expected a whole number, found nothing"),
+    ("invalid float literal", "expected a number"),
+    ("cannot parse float from empty string", "expected a number, found nothing"),
+    ("number too large to fit in target type", "expected a smaller whole number"),
+    ("number too small to fit in target type", "expected a larger whole number"),
+    ("provided string was not `true` or `false`", "expected true or false"),
+];
+const VALUE: &str = "expected a number, a text in double quotes, a list or a table (JSON has neither NaN nor Infinity)";
+const ESCAPE: &str = "expected an escape that JSON knows, such as \\n or \\u00e9";
+
 /// The message of a serde decoder (TOML, JSON or XML) as words: `invalid type: string "far", expected usize` becomes `expected a whole number, 0 or more, found the
 /// text "far"`. What it does not know stays as it is.
 ///
@@ -62,11 +97,29 @@ const FOUND: [(&str, &str); 13] = [
 pub fn plain(message: &str) -> String {
     let message = message.trim();
     let message = ["custom: ", "Custom: "].iter().find_map(|start| message.strip_prefix(start)).unwrap_or(message);
+    // Decoders of XML begin with the kind of the error, or with the place.
+    let message = ["ParseIntError: ", "ParseFloatError: ", "ParseBoolError: "]
+        .iter()
+        .find_map(|start| message.strip_prefix(start))
+        .unwrap_or(message);
+    if let Some((place, reason)) = message.strip_prefix("Parse error; ").and_then(|rest| rest.split_once(", Reason: "))
+    {
+        return format!("{}: {}", place.replace(':', "").to_lowercase(), plain(reason));
+    }
     // JSON decoders add the place.
     let (said, place) = match message.rfind(" at line ") {
         Some(at) if message[at..].contains(" column ") => message.split_at(at),
         _ => (message, ""),
     };
+    match (said, place) {
+        ("EOF while parsing a value", " at line 1 column 0") => {
+            return "expected JSON, the text ends before it is complete: it is empty".into();
+        }
+        ("expected value" | "expected ident", " at line 1 column 1" | " at line 1 column 2") => {
+            return "expected JSON, found other text".into();
+        }
+        _ => {}
+    }
     words(said).map_or_else(|| message.to_string(), |words| words + place)
 }
 
@@ -88,7 +141,13 @@ fn words(said: &str) -> Option<String> {
         return Some(format!("expected {}, found {found}", expectation(expected)));
     }
     if said.starts_with("EOF while parsing") {
-        return Some("the text ends before it is complete".into());
+        return Some("expected JSON, the text ends before it is complete".into());
+    }
+    if let Some((_, words)) = SENTENCES.iter().find(|(sentence, _)| *sentence == said) {
+        return Some((*words).to_string());
+    }
+    if let Some(problem) = said.strip_suffix(", expected nothing") {
+        return Some(problem.to_string());
     }
     let rest = known("invalid type: ").or_else(|| known("invalid value: "))?;
     // A text that was found may hold the words as well: the last ones count.
@@ -159,8 +218,31 @@ mod tests {
             ("unknown variant `x`, expected `y` or `z`", "there is no choice `x`, expected `y` or `z`"),
             (
                 "EOF while parsing an object at line 1 column 0",
-                "the text ends before it is complete at line 1 column 0",
+                "expected JSON, the text ends before it is complete at line 1 column 0",
             ),
+            (
+                "EOF while parsing a value at line 1 column 0",
+                "expected JSON, the text ends before it is complete: it is empty",
+            ),
+            (
+                "EOF while parsing a value at line 3 column 2",
+                "expected JSON, the text ends before it is complete at line 3 column 2",
+            ),
+            ("expected value at line 1 column 1", "expected JSON, found other text"),
+            ("expected ident at line 1 column 2", "expected JSON, found other text"),
+            (
+                "expected value at line 2 column 7",
+                "expected a number, a text in double quotes, a list or a table (JSON has neither NaN nor Infinity) at line 2 column 7",
+            ),
+            (
+                "control character (\\u0000-\\u001F) found while parsing a string at line 2 column 0",
+                "expected a text without control characters at line 2 column 0",
+            ),
+            ("unexpected leading zero, expected nothing", "unexpected leading zero"),
+            ("invalid type: unit variant, expected string only", "expected a name, or a table with one key"),
+            ("ParseFloatError: invalid float literal", "expected a number"),
+            ("Parse error; Line: 3, Column: 10, Reason: Malformed XML", "line 3, column 10: Malformed XML"),
+            ("number too large to fit in target type", "expected a smaller whole number"),
             ("invalid type: integer `1`, expected enum Verdict", "expected a name, or a table with one key, found 1"),
             ("what nobody knows", "what nobody knows"),
             ("", ""),

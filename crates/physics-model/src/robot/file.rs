@@ -45,8 +45,11 @@ fn parse(path: &Path, text: &str) -> Result<urdf_rs::Robot, RobotError> {
 
 /// What a file is that is no URDF.
 fn other_format(text: &str) -> Option<String> {
-    let root = xml::elements(text).next()?;
     let expected = "expected a URDF file, whose outermost element is <robot>";
+    let Some(root) = xml::elements(text).next() else {
+        let found = if text.trim().is_empty() { "an empty file" } else { "a text without elements" };
+        return Some(format!("{expected}, found {found}"));
+    };
     let found = match root.name.to_ascii_lowercase().as_str() {
         // Macros that nobody has expanded; a namespace alone is what xacro leaves behind.
         "robot" if xml::elements(text).any(|e| e.name.starts_with("xacro:") || e.inside.contains("${")) => {
@@ -107,6 +110,10 @@ mod tests {
             ("<?xml version='1.0'?><sdf version='1.7'/>".into(), "found SDF, the format of Gazebo"),
             ("<!DOCTYPE html>\n<html><body>404</body></html>".into(), "found a web page"),
             ("<urdf/>".into(), "whose outermost element is <robot>, found <urdf>"),
+            (String::new(), "whose outermost element is <robot>, found an empty file"),
+            (" \n".into(), "found an empty file"),
+            ("mine".into(), "found a text without elements"),
+            ("<?xml version=\"1.0\"?>".into(), "found a text without elements"),
             (robot("<xacro:include filename=\"a\"/>"), "run `xacro FILE > arm.urdf`"),
             (robot("<link name=\"${prefix}a\"/>"), "found xacro macros"),
             (robot(&JOINT.replace("<child link=\"b\"/>", "")), "joint \"elbow\" of arm.urdf: `child` is missing"),
