@@ -8,6 +8,8 @@ use agent::{Agent, Method, Timeouts, WorldAddress};
 use prior::Suggester;
 use scenario::{Filter, Problem, Published, Scenario, Selection};
 
+use crate::files::check_claim;
+use crate::run::OURS;
 use crate::{Error, Provenance, Run, RunIdentity, Shard, Table, Worlds};
 
 /// What is asked for.
@@ -131,6 +133,11 @@ impl Evaluation {
     /// As [`Run::open`].
     pub fn open(&self, folder: &Path) -> Result<Run, Error> {
         Run::open(folder, self.provenance.clone(), &self.scenario.to_toml())
+    }
+
+    /// Refuses a folder that [`Self::open`] would refuse for whose it is, and writes nothing.
+    pub(crate) fn check(&self, folder: &Path) -> Result<(), Error> {
+        check_claim(folder, "run.json", &self.provenance.run, &OURS)
     }
 
     /// Opens the run directory `folder`, which is there, for one of its workers.

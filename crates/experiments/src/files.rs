@@ -33,20 +33,30 @@ pub(crate) fn claim<T: Serialize>(
     ours: &[impl AsRef<Path>],
 ) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(file_error(folder, "creating the folder"))?;
+    check_claim(folder, name, identity, ours)?;
+    let file = folder.join(name);
+    if !file.exists() {
+        // Never replaced, as it carries the lock of the folder: where another program is quicker, its file counts.
+        let written = whole_file::write(&file, pretty(identity).as_bytes(), whole_file::Existing::Keep);
+        written.map_err(|e| file_error(&file, "writing")(e.source))?;
+    }
+    let text = std::fs::read_to_string(&file).map_err(file_error(&file, "reading"))?;
+    check_identity(&file, &text, identity)
+}
+
+/// Refuses a folder as [`claim`] does, and writes nothing.
+pub(crate) fn check_claim<T: Serialize>(
+    folder: &Path,
+    name: &'static str,
+    identity: &T,
+    ours: &[impl AsRef<Path>],
+) -> Result<(), Error> {
     let file = folder.join(name);
     match std::fs::read_to_string(&file) {
         Ok(text) => check_identity(&file, &text, identity),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            match ours.iter().map(|name| folder.join(name)).find(|file| file.exists()) {
-                Some(file) => Err(Error::Foreign { file, expected: name }),
-                None => {
-                    // Never replaced, as it carries the lock of the folder: where another program is quicker, its file counts.
-                    let written = whole_file::write(&file, pretty(identity).as_bytes(), whole_file::Existing::Keep);
-                    written.map_err(|e| file_error(&file, "writing")(e.source))?;
-                    let text = std::fs::read_to_string(&file).map_err(file_error(&file, "reading"))?;
-                    check_identity(&file, &text, identity)
-                }
-            }
+            let found = ours.iter().map(|name| folder.join(name)).find(|file| file.exists());
+            found.map_or(Ok(()), |file| Err(Error::Foreign { file, expected: name }))
         }
         Err(e) => Err(file_error(&file, "reading")(e)),
     }

@@ -61,6 +61,9 @@ pub struct Run {
     _lock: Option<Lock>,
 }
 
+/// What lies in a run directory beside `run.json`.
+pub(crate) const OURS: [&str; 6] = ["scenario.toml", "trials.jsonl", "table.json", "table.md", "table.csv", "shards"];
+
 impl Run {
     /// Opens or creates `folder` for a run and holds it; reads the trials that are finished.
     ///
@@ -69,8 +72,7 @@ impl Run {
     /// A folder of another run, one that another program holds, an unreadable record, a folder that cannot be written. Nothing is
     /// overwritten.
     pub fn open(folder: &Path, provenance: Provenance, scenario_toml: &str) -> Result<Self, Error> {
-        let ours = ["scenario.toml", "trials.jsonl", "table.json", "table.md", "table.csv"];
-        claim(folder, "run.json", &provenance.run, &ours)?;
+        claim(folder, "run.json", &provenance.run, &OURS)?;
         let lock = Lock::take(&folder.join("run.json"))?;
         // After the identity, so that a kill in between leaves a folder that says whose it is.
         let scenario_file = folder.join("scenario.toml");
@@ -262,7 +264,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    fn provenance(seed: u64) -> Provenance {
+    pub(crate) fn provenance(seed: u64) -> Provenance {
         Provenance {
             run: RunIdentity {
                 version: 1,

@@ -79,6 +79,12 @@ impl Suite {
         }
         let suite = Self { request, plan, common, entries };
         suite.check_worlds()?;
+        // All folders are looked at before anything is written to one.
+        for entry in &suite.entries {
+            if let Some(evaluation) = &entry.evaluation {
+                evaluation.check(&entry.folder)?;
+            }
+        }
         claim(&suite.request.out, IDENTITY, &suite.common, &suite.combined_files())?;
         for entry in &suite.entries {
             if let Some(evaluation) = &entry.evaluation {
@@ -225,11 +231,17 @@ impl Suite {
         Ok(())
     }
 
-    /// Names of files that only a suite leaves.
+    /// Names of files in the folder that only a suite leaves: tables and pictures, which begin with the name of a table.
     fn combined_files(&self) -> Vec<String> {
-        let tables =
-            self.plan.tables.iter().flat_map(|t| [".json", ".csv", ".md"].map(|end| format!("{}{end}", t.name)));
-        tables.chain(["clock.json".into()]).collect()
+        let entries = std::fs::read_dir(&self.request.out).into_iter().flatten().flatten();
+        let files = entries.filter(|entry| entry.path().is_file());
+        let names = files.filter_map(|entry| entry.file_name().into_string().ok());
+        let begins = |file: &str, name: &str| file.strip_prefix(name).is_some_and(|rest| rest.starts_with(['.', '-']));
+        let ours = |file: &String| {
+            let mut tables = self.plan.tables.iter().map(|table| table.name.as_str());
+            tables.any(|name| begins(file, name)) || begins(file, "clock") || begins(file, "figure4")
+        };
+        names.filter(ours).collect()
     }
 }
 

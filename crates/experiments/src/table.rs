@@ -122,7 +122,7 @@ impl Table {
         }
     }
 
-    /// For people.
+    /// For people; the last line says what the words mean.
     #[must_use]
     pub fn to_markdown(&self) -> String {
         let mut text = String::from(
@@ -164,7 +164,16 @@ impl Table {
             let _ =
                 writeln!(text, "| {names} | {both} | {first_only} | {second_only} | {neither} | {} |", probability(*p));
         }
-        text
+        text + "\n" + &self.words() + "\n"
+    }
+
+    /// What success, interval, p and the methods of this table mean, as the glossary says.
+    fn words(&self) -> String {
+        let methods = self.rows.iter().map(|row| row.method.name());
+        let p = (!self.pairs.is_empty()).then_some("McNemar p");
+        let terms = ["success", "95 % interval"].into_iter().chain(p).chain(methods);
+        let defined = terms.filter_map(page::word).map(|word| format!("{}: {}", word.term, word.means));
+        defined.collect::<Vec<_>>().join(" ")
     }
 
     /// For spreadsheets.
@@ -220,4 +229,32 @@ impl Table {
 /// Successes and trials of a published result; empty where there is none.
 pub(crate) fn published_cells(published: Option<Published>) -> [String; 2] {
     published.map_or_else(Default::default, |p| [p.successes.to_string(), p.trials.to_string()])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::tests::{provenance, record};
+
+    #[test]
+    fn a_table_for_people_ends_with_what_its_words_mean() {
+        let table = |methods: &[Method]| {
+            let provenance = Provenance { methods: methods.to_vec(), trials: 1, ..provenance(1) };
+            let trials = methods.iter().map(|method| ((*method, 0), record(*method, 0, true))).collect();
+            Table::new("D1", "sawyer", "surmise", &provenance, &trials, &BTreeMap::new()).to_markdown()
+        };
+        let all = table(&Method::ALL);
+        let (_, last) = all.trim_end().rsplit_once("\n\n").unwrap();
+        assert_eq!(last.lines().count(), 1, "{last}");
+        for method in Method::ALL {
+            let means = page::word(method.name()).unwrap_or_else(|| panic!("{}", method.name())).means.as_str();
+            assert!(last.contains(&format!("{}: {means}", method.name())), "{last}");
+        }
+        for term in ["success: The number", "95 % interval: Wilson", "McNemar p: "] {
+            assert!(last.contains(term), "{term}: {last}");
+        }
+        // Only what the table has.
+        let one = table(&[Method::Heuristic]);
+        assert!(one.contains("heuristic: ") && !one.contains("oracle") && !one.contains("McNemar"), "{one}");
+    }
 }
