@@ -16,8 +16,9 @@ pub fn root() -> PathBuf {
 
 pub use skipped::skipped;
 
-/// Says that `cargo xtask ci` has built the programs: where each test is a process of its own, none has to ask cargo again.
-const BUILT: &str = "SURMISE_BUILT";
+/// Says that `cargo xtask ci` has built the programs: where each test is a process of its own, none has to ask cargo again. The menu builds all
+/// programs together then.
+pub const BUILT: &str = "SURMISE_BUILT";
 
 /// A release program, built from this checkout if need be, set to run at its root. All programs are built together, as `xtask` does, and
 /// once for all tests.

@@ -10,6 +10,10 @@ use anyhow::{Context as _, Result};
 /// once; `tests/suite/architecture.rs` holds that. Those that train bring burn, with other features, and compile it all once more.
 const ALWAYS: [&str; 2] = ["report", "measured-log"];
 
+/// Says that all programs are built together, as CI does: then they are built so again, which takes no time, and not one by one with other
+/// features of what they share, which takes minutes.
+pub(crate) const BUILT: &str = "SURMISE_BUILT";
+
 /// The package of a program.
 fn package(binary: &str) -> &str {
     match binary {
@@ -30,6 +34,10 @@ pub(crate) fn become_program(binary: &str, arguments: &[String]) -> Result<ExitC
     let started: &[&str] = if binary == "diagnose-benchmark" { &["diagnose"] } else { &[] };
     // A first build takes minutes: who looks on should see it.
     let mut selection = if std::io::stderr().is_terminal() { Vec::new() } else { vec!["--quiet"] };
+    if std::env::var_os(BUILT).is_some() {
+        selection.extend(["--workspace", "--bins"]);
+        return build_and_become(&selection, binary, arguments);
+    }
     selection.extend(ALWAYS.iter().flat_map(|package| ["--package", package]));
     for binary in [binary].iter().chain(started) {
         selection.extend(["--package", package(binary), "--bin", binary]);
@@ -41,8 +49,36 @@ pub(crate) fn become_program(binary: &str, arguments: &[String]) -> Result<ExitC
 pub(crate) const VIEWER: &str = "to-rerun";
 
 /// The one program that is apart: it brings the viewer's library, which nothing else should wait for.
+///
+/// An episode that is not there is told before that library is built, in a quarter of an hour.
 pub(crate) fn become_viewer(arguments: &[String]) -> Result<ExitCode> {
+    if let Some(problem) = missing_episode(arguments) {
+        program::complain(&problem);
+        return Ok(ExitCode::from(2));
+    }
     build_and_become(&["--package", "recording", "--features", "rerun", "--bin", VIEWER], VIEWER, arguments)
+}
+
+/// What the viewer's program would say of its command line, as far as it is about the episode; `None` where that is there, and where help is asked for.
+fn missing_episode(arguments: &[String]) -> Option<String> {
+    if arguments.iter().any(|argument| ["-h", "--help", "-V", "--version"].contains(&argument.as_str())) {
+        return None;
+    }
+    let mut rest = arguments.iter();
+    let mut episode = None;
+    while let Some(argument) = rest.next() {
+        match argument.as_str() {
+            "--out" => drop(rest.next()),
+            option if option.starts_with('-') => {}
+            path => episode = episode.or(Some(Path::new(path))),
+        }
+    }
+    let Some(episode) = episode else {
+        return Some("rerun: expected the folder of an episode of `demo`, or its trace.json, as in `cargo xtask rerun runs/demo/NAME`".into());
+    };
+    let trace = if episode.is_dir() { episode.join("trace.json") } else { episode.to_path_buf() };
+    let is_there = trace.is_file();
+    (!is_there).then(|| format!("{}: expected an episode of `demo`, found no such file", trace.display()))
 }
 
 fn build_and_become(selection: &[&str], binary: &str, arguments: &[String]) -> Result<ExitCode> {
@@ -88,4 +124,54 @@ pub(crate) fn cargo(root: &Path) -> Command {
 pub(crate) fn root() -> PathBuf {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.parent().unwrap_or(package).to_path_buf()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cargo refuses a selection with a package or a program that does not exist.
+    #[test]
+    fn every_verb_has_a_program_in_its_package() {
+        use clap::CommandFactory as _;
+        let output = cargo(&root()).args(["metadata", "--no-deps", "--format-version", "1"]).output().unwrap();
+        let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let mut programs = Vec::new();
+        for found in metadata["packages"].as_array().unwrap() {
+            for target in found["targets"].as_array().unwrap().iter().filter(|target| target["kind"][0] == "bin") {
+                programs.push((found["name"].as_str().unwrap(), target["name"].as_str().unwrap()));
+            }
+        }
+        let menu = crate::Menu::command();
+        let behind = |verb: &&clap::Command| verb.get_arguments().any(|argument| argument.get_id() == "arguments");
+        let verbs: Vec<&str> = menu.get_subcommands().filter(behind).map(clap::Command::get_name).collect();
+        assert!(verbs.len() > 10, "{verbs:?}");
+        for verb in verbs.into_iter().filter(|verb| *verb != "rerun") {
+            assert!(programs.contains(&(package(verb), verb)), "{verb} in {programs:?}");
+        }
+        assert!(programs.contains(&("recording", VIEWER)));
+        assert!(ALWAYS.iter().all(|package| programs.iter().any(|(name, _)| name == package)), "{programs:?}");
+    }
+
+    #[test]
+    fn an_episode_that_is_not_there_is_told_before_anything_is_built() {
+        let folder = tempfile::tempdir().unwrap();
+        let problem = |arguments: &[&str]| {
+            missing_episode(&arguments.iter().map(ToString::to_string).collect::<Vec<_>>()).unwrap_or_default()
+        };
+        let path = folder.path().display().to_string();
+        let trace = folder.path().join("trace.json");
+        let message = format!("{}: expected an episode of `demo`, found no such file", trace.display());
+        assert_eq!(problem(&[&path]), message);
+        assert_eq!(problem(&["--out", "a.rrd", &path]), message);
+        assert!(problem(&["nothere"]).starts_with("nothere: expected an episode"));
+        assert!(problem(&[]).starts_with("rerun: expected the folder of an episode"));
+        assert!(problem(&["--out", "a.rrd"]).starts_with("rerun: expected"));
+        std::fs::write(&trace, "{}").unwrap();
+        for good in
+            [&[path.as_str()][..], &[trace.to_str().unwrap()], &["--out=a", &path], &["--help"], &["nothere", "-h"]]
+        {
+            assert_eq!(problem(good), "", "{good:?}");
+        }
+    }
 }

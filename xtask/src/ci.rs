@@ -6,14 +6,12 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result};
 
-use crate::built::{cargo, folder, root};
+use crate::built::{BUILT, cargo, folder, root};
 
 /// Tests that are named with their times.
 const SLOWEST: usize = 10;
 /// Where tests say that they did nothing, and why: a line `TEST: reason` each.
 const SKIPPED: &str = "target/skipped.txt";
-/// Tells tests that the programs are built.
-const BUILT: &str = "SURMISE_BUILT";
 /// The variable that says so to tests.
 const SKIPPED_FILE: &str = "SURMISE_SKIPPED";
 /// With the value 1: nothing may be skipped.

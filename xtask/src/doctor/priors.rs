@@ -20,7 +20,8 @@ fn prior(root: &Path, folder: &str) -> Result<String, (State, String)> {
     let broken = |problem: String| (State::Broken, problem);
     let head = root.join(folder).join("prior.json");
     let text = std::fs::read_to_string(&head).map_err(|_| (State::Missing, format!("no {folder}/prior.json")))?;
-    let head: Value = serde_json::from_str(&text).map_err(|error| broken(format!("prior.json: {error}")))?;
+    let head: Value = serde_json::from_str(&text)
+        .map_err(|error| broken(format!("prior.json: {}", whole_file::plain(&error.to_string()))))?;
     let (Some(name), Some(bytes)) = (head["weights"]["name"].as_str(), head["weights"]["bytes"].as_u64()) else {
         return Err(broken("prior.json names no weights".into()));
     };
