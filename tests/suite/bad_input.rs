@@ -1,13 +1,15 @@
 //! Bad input ends with exit code 2 and one sentence that names file, key and expectation; nothing is written.
 
 use std::path::Path;
+use std::process::Output;
 
 use end_to_end::{files, root, run, stderr};
+use serde_json::Value;
 
 use crate::pipeline::trained;
 
 /// Words of decoders and of Rust, which say nothing to who writes a file.
-const RUST: [&str; 16] = [
+const RUST: [&str; 25] = [
     "usize",
     "u32",
     "u64",
@@ -24,21 +26,33 @@ const RUST: [&str; 16] = [
     "Some(",
     "None",
     "visitor",
+    "EOF while",
+    "expected value",
+    "expected ident",
+    "No elements",
+    "string only",
+    "invalid digit",
+    "invalid float literal",
+    "trailing characters",
+    "key must be a string",
 ];
 
 /// Runs, expects exit code 2 and one line that holds all `parts`.
 pub(crate) fn refused(binary: &str, arguments: &str, parts: &[&str]) {
-    let output = run(binary, arguments);
-    let message = stderr(&output);
-    assert_eq!(output.status.code(), Some(2), "{binary} {arguments}: {message}");
-    assert_eq!(message.trim().lines().count(), 1, "{binary} {arguments}: {message}");
+    is_refusal(&format!("{binary} {arguments}"), &run(binary, arguments), parts);
+}
+
+fn is_refusal(command: &str, output: &Output, parts: &[&str]) {
+    let message = stderr(output);
+    assert_eq!(output.status.code(), Some(2), "{command}: {message}");
+    assert_eq!(message.trim().lines().count(), 1, "{command}: {message}");
     for part in parts {
-        assert!(message.contains(part), "{binary} {arguments}: expected `{part}` in: {message}");
+        assert!(message.contains(part), "{command}: expected `{part}` in: {message}");
     }
     for word in RUST {
-        assert!(!message.contains(word), "{binary} {arguments}: `{word}` in: {message}");
+        assert!(!message.contains(word), "{command}: `{word}` in: {message}");
     }
-    assert!(output.stdout.is_empty(), "{binary} {arguments}");
+    assert!(output.stdout.is_empty(), "{command}");
 }
 
 fn copy(from: &Path, to: &Path) {
@@ -237,11 +251,157 @@ fn programs_outside_the_project_say_so() {
     assert!(root().join("scenarios/base.toml").is_file());
 }
 
+/// What the menu does with a command. The programs are built as this suite has built them, all together: one by one, cargo would choose other
+/// features for what they share, and compile that anew for minutes.
+fn menu(arguments: &str) -> Output {
+    let mut menu = end_to_end::program("xtask");
+    menu.env(end_to_end::BUILT, "1").args(arguments.split_whitespace()).output().unwrap()
+}
+
 #[test]
 fn the_menu_hands_on_arguments_and_exit_codes() {
-    let help = run("xtask", "datagen --help");
-    assert!(help.status.success());
+    let help = menu("datagen --help");
+    assert!(help.status.success(), "{}", stderr(&help));
     assert!(String::from_utf8_lossy(&help.stdout).contains("--transitions"), "the program's own help");
-    refused("xtask", "eval --domain D9", &["unknown domain `D9`"]);
-    assert_eq!(run("xtask", "nonsense").status.code(), Some(2));
+    let output = menu("eval --domain D9");
+    is_refusal("xtask eval --domain D9", &output, &["unknown domain `D9`"]);
+    assert_eq!(menu("nonsense").status.code(), Some(2));
+    // Before the viewer's library is built.
+    for arguments in ["rerun nothere", "rerun"] {
+        is_refusal(arguments, &menu(arguments), &["expected", "demo"]);
+    }
+}
+
+/// Options of a command that take a value, with the commands that lead to it.
+fn options_with_values(command: &Value, path: &[String], found: &mut Vec<(Vec<String>, String)>) {
+    for option in command["options"].as_array().unwrap() {
+        let usage = option["usage"].as_str().unwrap();
+        let mut words = usage.split([' ', ',', '=']).filter(|word| !word.is_empty());
+        if let (Some(name), true) = (words.find(|word| word.starts_with("--")), usage.contains('<')) {
+            found.push((path.to_vec(), name.to_owned()));
+        }
+    }
+    for inner in command["commands"].as_array().unwrap() {
+        let name = inner["name"].as_str().unwrap().to_owned();
+        options_with_values(inner, &[path, &[name]].concat(), found);
+    }
+}
+
+#[test]
+fn a_value_of_any_option_that_is_none_is_answered_in_words() {
+    // Programs with a command line of their own kind: the menu's own verbs, and one that measures.
+    const ELSEWHERE: [&str; 5] = ["doctor", "completions", "ci", "bench", "rerun"];
+    let described = run("xtask", "describe");
+    let verbs: Value = serde_json::from_slice(&described.stdout).unwrap();
+    let (mut options, mut numbers) = (Vec::new(), 0);
+    for verb in verbs.as_array().unwrap() {
+        let name = verb["name"].as_str().unwrap();
+        if !ELSEWHERE.contains(&name) {
+            options_with_values(verb, &[name.to_owned()], &mut options);
+        }
+    }
+    assert!(options.len() > 80, "{} options", options.len());
+    for (path, option) in options {
+        for value in ["-1", "x", "1e400", "99999999999999999999999"] {
+            // A value that is good is not used: help is all that is asked for then.
+            let mut program = end_to_end::program(&path[0]);
+            let output = program.args(&path[1..]).args([&option, value, "--help"]).output().unwrap();
+            let message = stderr(&output);
+            let name = format!("{} {option} {value}", path.join(" "));
+            if message.starts_with(&format!("error: {option}")) {
+                is_refusal(&name, &output, &["expected", value]);
+                numbers += 1;
+            } else {
+                assert!(output.status.success() || message.contains("possible values"), "{name}: {message}");
+            }
+        }
+    }
+    assert!(numbers > 60, "{numbers} values are refused");
+    refused("demo", "--trial -1", &["--trial", "expected a whole number, 0 or more, found `-1`"]);
+}
+
+/// Texts that are no file of any kind.
+const NO_FILE: [&str; 6] = ["", "\n", "{", "[1, 2", "mine", "{\"a\": 1,"];
+
+#[test]
+fn json_that_is_empty_or_cut_off_is_answered_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let published = root().join("assets/results/table1-surmise-D4");
+    copy(&published, &path("run"));
+    copy(&trained().data, &path("data"));
+    copy(&trained().prior, &path("prior"));
+    copy(&trained().data, &path("plan"));
+    std::fs::create_dir(path("episode")).unwrap();
+    std::fs::create_dir(path("benchmark")).unwrap();
+    let out = path("out");
+    let cases = [
+        ("report", "run/run.json", format!("{}", path("run").display())),
+        ("report", "episode/trace.json", format!("{}", path("episode").display())),
+        (
+            "train",
+            "data/meta/info.json",
+            format!("--epochs 1 --data {} --out {}", path("data").display(), out.display()),
+        ),
+        ("eval", "prior/prior.json", {
+            let prior = path("prior");
+            format!("--domain D1 --quick --methods mixture --prior {} --out {}", prior.display(), out.display())
+        }),
+        ("datagen", "plan/plan.json", format!("--transitions 2000 --out {}", path("plan").display())),
+        ("diagnose-benchmark", "benchmark/plan.json", format!("--sets 0 --out {}", path("benchmark").display())),
+    ];
+    for (binary, file, arguments) in cases {
+        let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+        let whole = std::fs::read_to_string(path(file)).unwrap_or_else(|_| "{\"version\": 1, \"title\": \"a".into());
+        let half: String = whole.chars().take(whole.chars().count() / 2).collect();
+        for text in NO_FILE.into_iter().chain([half.as_str()]) {
+            std::fs::write(path(file), text).unwrap();
+            refused(binary, &arguments, &[name]);
+            assert_eq!(std::fs::read_to_string(path(file)).unwrap(), text, "{binary}");
+        }
+    }
+    assert!(!out.exists(), "a refused run leaves nothing behind");
+}
+
+#[test]
+fn toml_and_urdf_that_are_empty_or_cut_off_are_answered_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let out = path("out");
+    copy(&root().join("tests/data/mujoco-logs/logs/set-003"), &path("log"));
+    let diagnose = |rest: &str| format!("{rest} --out {}", out.display());
+    let log = diagnose(&format!("--measured {}", path("log").display()));
+    let model = format!("--measured tests/data/mujoco-logs/logs/set-003 --model {}", path("model.toml").display());
+    let check = |rest: &str, name: &str| format!("check {rest}{}", path(name).display());
+    let cases = [
+        ("scenario", "domain.toml", check("", "domain.toml")),
+        ("scenario", "arm.toml", check("D1 --robot ", "arm.toml")),
+        ("scenario", "preset.toml", check("D1 --preset ", "preset.toml")),
+        ("scenario", "model.toml", check("D1 --model ", "model.toml")),
+        ("scenario", "arm.urdf", check("D1 --set robot.urdf=", "arm.urdf")),
+        ("diagnose", "log/log.toml", log),
+        ("diagnose", "model.toml", diagnose(&model)),
+    ];
+    for (binary, file, arguments) in cases {
+        let name = Path::new(file).file_name().unwrap().to_str().unwrap();
+        let unfinished = ["a = ", "a = \"b", "[a", "a = { b = 1", "<robot", "<robot name='r'><link name='base'>"];
+        for text in NO_FILE.into_iter().chain(unfinished) {
+            std::fs::write(path(file), text).unwrap();
+            // The layers of a scenario make one: what no layer says may be asked of another.
+            let layer = binary == "scenario" && text.trim().is_empty();
+            let named = if layer { Vec::new() } else { vec![name] };
+            refused(binary, &arguments, &named);
+        }
+    }
+    // A scenario without a name: its own file is asked for it, and no other.
+    std::fs::write(path("domain.toml"), "version = 1\n").unwrap();
+    let message = stderr(&run("scenario", &check("", "domain.toml")));
+    assert_eq!(message.trim(), format!("error: {}: key `name`: `name` is missing", path("domain.toml").display()));
+    // A name where a table is expected.
+    refused(
+        "scenario",
+        "check D1 --set planner.budget=5",
+        &["`planner.budget`", "expected a name, or a table with one key"],
+    );
+    assert!(!out.exists(), "a refused run leaves nothing behind");
 }

@@ -256,6 +256,11 @@ fn play_commands(document: &str, commands: Vec<String>, but: &[&str], lacking: &
     for command in commands {
         let all = words(&command);
         let (verb, rest) = (all[0].as_str(), &all[1..]);
+        if let ("rerun", Some(episode)) = (verb, rest.first()) {
+            // What makes recordings is not built here; the episode has to be one that a command above has left.
+            let trace = project.path().join(episode.replace("runs/", "runs/quick/")).join("trace.json");
+            assert!(is_synopsis(&command) || trace.is_file(), "{document}: {command}: no {}", trace.display());
+        }
         let left_out = but.contains(&verb) || NOT_HERE.contains(&verb);
         // An engine, another simulator, a robot behind a socket.
         let absent = ["slurm", "hq", "mujoco_jaco.py", "tcp://127.0.0.1:5555"];

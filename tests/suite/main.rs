@@ -15,4 +15,5 @@ mod licences;
 mod output;
 mod pages;
 mod pipeline;
+mod places;
 mod world;

@@ -14,10 +14,16 @@ const MARK: &str = ".surmise-docs";
 /// Where files from outside the book are put.
 const PROJECT: &str = "project";
 
-/// A folder that holds files of others.
+/// A folder that documentation cannot go to.
 #[derive(Debug, thiserror::Error)]
-#[error("--out {}: expected a new folder or one of earlier documentation, found other files", .0.display())]
-pub struct Taken(PathBuf);
+pub enum Taken {
+    /// It holds files of others.
+    #[error("--out {}: expected a new folder or one of earlier documentation, found other files", .0.display())]
+    Others(PathBuf),
+    /// It is none.
+    #[error("{}: {}", .0, .0.source)]
+    Place(whole_file::Error),
+}
 
 /// Makes HTML of `docs/` in `out`.
 ///
@@ -25,7 +31,7 @@ pub struct Taken(PathBuf);
 ///
 /// [`Taken`]; a book that mdBook refuses; a disk that does.
 pub fn build(root: &Path, out: &Path) -> Result<()> {
-    claim(out)?;
+    check(out)?;
     let file = root.join("docs/book.toml");
     let mut config = Config::from_disk(&file).with_context(|| format!("cannot read {}", file.display()))?;
     config.build.build_dir = std::path::absolute(out)?;
@@ -38,15 +44,20 @@ pub fn build(root: &Path, out: &Path) -> Result<()> {
     std::fs::write(out.join(MARK), "").with_context(|| format!("cannot write to {}", out.display()))
 }
 
-/// Refuses a folder with files of others.
-fn claim(out: &Path) -> Result<()> {
+/// Refuses a folder with files of others, and what is none.
+///
+/// # Errors
+///
+/// [`Taken`]; a folder that cannot be listed.
+pub fn check(out: &Path) -> Result<()> {
+    whole_file::check_folder(out).map_err(Taken::Place)?;
     let mut entries = match std::fs::read_dir(out) {
         Ok(entries) => entries,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(error).with_context(|| format!("--out {}: expected a folder", out.display())),
+        Err(error) => return Err(error).with_context(|| format!("cannot list {}", out.display())),
     };
     if entries.next().is_some() && !out.join(MARK).exists() {
-        return Err(Taken(out.to_path_buf()).into());
+        return Err(Taken::Others(out.to_path_buf()).into());
     }
     Ok(())
 }

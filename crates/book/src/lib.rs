@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
-pub use html::{Taken, build, copy_folder};
+pub use html::{Taken, build, check, copy_folder};
 
 /// A file that is made from the code.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
 use anyhow::{Context as _, Result, bail};
-use book::{Page, Taken, build, copy_folder, outdated, pages};
+use book::{Page, Taken, build, check, copy_folder, outdated, pages};
 use clap::Parser;
 use whole_file::Existing;
 
@@ -33,24 +33,23 @@ struct Arguments {
 const NO_LIBRARY: [&str; 3] = ["end-to-end", "fuzzing", "xtask"];
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
+    match run(&program::parse()) {
         Ok(code) => code,
         Err(error) => {
             program::complain(&*error);
-            if error.is::<Taken>() { ExitCode::from(2) } else { ExitCode::FAILURE }
+            let bad_input = error.is::<Taken>() || error.is::<scenario::Error>();
+            if bad_input { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }
 }
 
 fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => scenario::find_root(&std::env::current_dir()?)?,
-    };
+    let root = scenario::project_root(arguments.root.as_deref())?;
     if arguments.write || arguments.check {
         return made_pages(&root, arguments.write);
     }
     let out = arguments.out.clone().unwrap_or_else(|| root.join("target/docs"));
+    check(&out)?;
     program::say!("the book");
     build(&root, &out)?;
     if !arguments.no_api {

@@ -70,7 +70,7 @@ const FAILED: Failed = Failed::new("the run stopped, finished shards are kept");
 
 fn main() -> ExitCode {
     program::log_on_request();
-    program::resumable("shards", run(&Arguments::parse()))
+    program::resumable("shards", run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
@@ -85,12 +85,12 @@ fn run(arguments: &Arguments) -> Result<bool> {
         engine.check()?;
     }
     whole_file::check_owner(&job.out, "plan.json")?;
-    // A dataset begins with its plan: a manifest without one is somebody else's.
-    let manifest = job.out.join("meta/info.json");
-    if manifest.exists() && !job.out.join("plan.json").exists() {
+    // A dataset begins with its plan: a manifest or data without one are somebody else's.
+    let parts = ["meta/info.json", "data"].map(|part| job.out.join(part));
+    if let Some(part) = parts.iter().find(|part| part.exists() && !job.out.join("plan.json").exists()) {
         anyhow::bail!(
             "{}: it lies in a folder without plan.json, which datagen writes first: choose another folder",
-            manifest.display()
+            part.display()
         );
     }
     job.plan.open(&job.out)?;

@@ -27,6 +27,9 @@ use crate::recording::RecordError;
 /// Draws of a set whose true world goes where no log does, at most.
 const ATTEMPTS: u64 = 20;
 
+/// What is written last, from all answers.
+pub const TABLES: [&str; 6] = ["table.json", "table.md", "table.csv", "confusion.md", "confusion.csv", "sets.csv"];
+
 /// What a folder belongs to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
@@ -53,20 +56,26 @@ impl Folder {
     /// A folder of other options, or one that another process holds.
     pub fn open(root: &Path, identity: &Identity, any_solver: bool) -> Result<Self> {
         let parts = ["logs", "answers", "truth", "reference"];
-        // What is half made there is made anew: it must not be somebody else's.
-        if !root.join("plan.json").exists()
-            && let Some(part) = parts.iter().find(|part| root.join(part).exists())
+        let path = root.join("plan.json");
+        whole_file::check_owner(root, "plan.json")?;
+        // What is half made there is made anew, and tables are replaced: they must not be somebody else's.
+        if !path.exists()
+            && let Some(part) = parts.iter().chain(&TABLES).find(|part| root.join(part).exists())
         {
             bail!("{}: holds {part} without plan.json: give another --out", root.display());
         }
+        if path.exists() {
+            // Another program's plan is no place for a lock.
+            read::<Identity>(&path)?;
+        }
         std::fs::create_dir_all(root).with_context(|| format!("cannot create {}", root.display()))?;
-        let lock = File::create(root.join(".lock")).context("cannot hold the folder")?;
+        let lock =
+            File::options().create(true).append(true).open(root.join(".lock")).context("cannot hold the folder")?;
         match lock.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => bail!("{}: another benchmark is at work there", root.display()),
             Err(TryLockError::Error(error)) => return Err(error).context("cannot hold the folder"),
         }
-        let path = root.join("plan.json");
         if path.exists() {
             let found: Identity = read(&path)?;
             let solver = if any_solver { found.solver.clone() } else { identity.solver.clone() };

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use anyhow::{Context as _, Result};
 use clap::Parser;
-use diagnose_benchmark::folder::{Folder, Identity, name, save};
+use diagnose_benchmark::folder::{Folder, Identity, TABLES, name};
 use diagnose_benchmark::generate::Actions;
 use diagnose_benchmark::plan::{Options, Plan, VERSION};
 use diagnose_benchmark::score::{Score, score};
@@ -78,10 +78,14 @@ const FAILED: Failed = Failed::new("the benchmark stopped, finished sets are kep
 const SCORES_A_LINE: usize = 50;
 
 fn main() -> ExitCode {
-    program::resumable("sets", run(&Arguments::parse()))
+    program::resumable("sets", run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
+    let arms = arguments.root.as_deref();
+    if let Some(root) = arms {
+        physics_model::robot::check_root(root)?;
+    }
     let options = Options {
         version: VERSION,
         seed: arguments.seed,
@@ -108,7 +112,6 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let interrupted = program::interrupts()?;
     let threads = arguments.threads.unwrap_or(0);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads")?;
-    let arms = arguments.root.as_deref();
     if !arguments.score_only && !answer(&folder, &plan, &diagnose, arms, &pool, &interrupted)? {
         return Ok(false);
     }
@@ -181,16 +184,16 @@ fn answer(
 }
 
 fn write(folder: &Folder, table: &Table, scores: &[Score]) -> Result<()> {
-    let root = folder.root();
-    save(&root.join("table.json"), table)?;
-    for (file, text) in [
-        ("table.md", table.to_markdown()),
-        ("table.csv", table.to_csv()),
-        ("confusion.md", table.confusion_to_markdown()),
-        ("confusion.csv", table.confusion_to_csv()),
-        ("sets.csv", sets_to_csv(scores)),
-    ] {
-        whole_file::write(&root.join(file), text.as_bytes(), Existing::Replace)?;
+    let texts = [
+        serde_json::to_string_pretty(table)? + "\n",
+        table.to_markdown(),
+        table.to_csv(),
+        table.confusion_to_markdown(),
+        table.confusion_to_csv(),
+        sets_to_csv(scores),
+    ];
+    for (file, text) in TABLES.iter().zip(texts) {
+        whole_file::write(&folder.root().join(file), text.as_bytes(), Existing::Replace)?;
     }
     Ok(())
 }

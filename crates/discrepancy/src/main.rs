@@ -9,7 +9,7 @@ use discrepancy::interval::decimals;
 use discrepancy::{Error, ModelFile, Nominal, Report, Settings, Verdict, diagnose_watched, page, rig_tool};
 use measured_log::Robot;
 use physics_model::EffectConfig;
-use physics_model::robot::find_root;
+use physics_model::robot::{check_root, find_root};
 use program::typed;
 use serde::Deserialize;
 use whole_file::Existing;
@@ -61,7 +61,7 @@ Examples:
 fn main() -> ExitCode {
     // 2 is bad input; a disk that refuses is a failure.
     program::end(
-        run(&Arguments::parse()),
+        run(&program::parse()),
         |error| {
             if let Error::Write { .. } | Error::Folder { .. } = error { 1 } else { 2 }
         },
@@ -77,6 +77,9 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     // Clap asks for it unless the effects are to be listed.
     let Some(measured) = &arguments.measured else { return list_effects(arguments.json) };
+    if let Some(root) = &arguments.root {
+        check_root(root)?;
+    }
     let log = measured_log::read(measured)?;
     let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
     let owner = folder::owner(measured);
@@ -147,14 +150,11 @@ fn begin_with(path: &Path, out: &Path, nominal: &mut Nominal) -> Result<ModelFil
     }
 }
 
-/// Whether the results can be written: a disk may refuse, and where a file has to go a folder may be.
+/// Whether the results can be written: a disk may refuse.
 fn check_writable(out: &Path) -> Result<(), Error> {
-    let refuse = |path: PathBuf, source| Error::Folder { path, source };
-    if let Some(taken) = FILES.iter().map(|file| out.join(file)).find(|path| path.is_dir()) {
-        return Err(refuse(taken, std::io::Error::other("expected a file or nothing there, found a folder")));
-    }
     let probe = out.join(format!(".writable-{}", std::process::id()));
-    std::fs::write(&probe, "").and_then(|()| std::fs::remove_file(&probe)).map_err(|source| refuse(probe, source))
+    let written = std::fs::write(&probe, "").and_then(|()| std::fs::remove_file(&probe));
+    written.map_err(|source| Error::Folder { path: probe, source })
 }
 
 /// Parts of a cross-validation, at most.

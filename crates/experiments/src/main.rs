@@ -110,7 +110,7 @@ const FAILED: Failed = Failed::new("the run stopped, finished trials are kept");
 
 fn main() -> ExitCode {
     program::log_on_request();
-    program::resumable("trials", run(&Arguments::parse()))
+    program::resumable("trials", run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
@@ -178,6 +178,7 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
 fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
     let default = || root.join(if arguments.quick { "runs/quick/all" } else { "runs/all" });
     let out = arguments.out.clone().unwrap_or_else(default);
+    whole_file::check_folder(&out)?;
     let request = SuiteRequest {
         root: root.to_path_buf(),
         out: out.clone(),

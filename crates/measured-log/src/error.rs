@@ -17,6 +17,12 @@ pub enum Error {
         /// Why it failed.
         source: std::io::Error,
     },
+    /// The folder for a log is none, or holds results of another kind.
+    #[error("{source}: {}", source.source)]
+    Taken {
+        /// What is there.
+        source: whole_file::Error,
+    },
     /// A file could not be written whole.
     #[error("{source}: {}", source.source)]
     Write {

@@ -66,17 +66,18 @@ Examples:
   cargo xtask import-log cmu-push record.txt.gz --friction-force 5.0 --out runs/logs/push";
 
 fn main() -> ExitCode {
-    let (imported, target) = match Arguments::parse().source {
+    // 2 is bad input; a disk that refuses is a failure.
+    let (imported, target) = match program::parse::<Arguments>().source {
         Source::Contactnets { source, target } => (import::contactnets(&source), target),
         Source::CmuPush { source, friction_force, target } => (import::cmu_push(&source, friction_force), target),
     };
-    // 2 is bad input; a disk that refuses is a failure.
     program::end(imported.and_then(|(log, notes)| write(&target, &log, &notes)), |error| {
         if let Error::Write { .. } = error { 1 } else { 2 }
     })
 }
 
 fn write(target: &Target, log: &Log, notes: &Notes) -> Result<(), Error> {
+    whole_file::check_owner(&target.out, "log.toml").map_err(|source| Error::Taken { source })?;
     let format = match target.format {
         Samples::Csv => Format::Csv,
         Samples::Parquet => Format::Parquet,

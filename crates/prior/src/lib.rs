@@ -120,10 +120,20 @@ pub fn default_folder(root: &std::path::Path, robot: &str, quick: bool) -> std::
     candidates.into_iter().find(|folder| folder.join(checkpoint::FILE).is_file()).unwrap_or_else(|| at("assets/priors"))
 }
 
-/// The nearest folder at or above `start` with scenarios, else `start`. The programs of this crate need no scenario,
-/// only a place for their default folders.
-#[must_use]
-pub fn project_root(start: &std::path::Path) -> std::path::PathBuf {
+/// The project folder that a command line names, or the nearest one at or above `start`, else `start`. The programs of this crate need no
+/// scenario, only a place for their default folders.
+///
+/// # Errors
+///
+/// Where the folder that is named is no project.
+pub fn project_root(
+    given: Option<&std::path::Path>,
+    start: &std::path::Path,
+) -> Result<std::path::PathBuf, physics_model::robot::RobotError> {
+    if let Some(root) = given {
+        physics_model::robot::check_root(root)?;
+        return Ok(root.to_path_buf());
+    }
     let found = start.ancestors().find(|folder| folder.join("scenarios/base.toml").is_file());
-    found.unwrap_or(start).to_path_buf()
+    Ok(found.unwrap_or(start).to_path_buf())
 }

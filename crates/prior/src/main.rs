@@ -80,14 +80,11 @@ const FAILED: Failed = Failed::new("the training stopped, finished epochs are ke
 
 fn main() -> ExitCode {
     program::log_on_request();
-    program::resumable("epochs", run(&Arguments::parse()))
+    program::resumable("epochs", run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => prior::project_root(&std::env::current_dir()?),
-    };
+    let root = prior::project_root(arguments.root.as_deref(), &std::env::current_dir()?)?;
     let runs = root.join(if arguments.quick { "runs/quick" } else { "runs" });
     let data = arguments.data.clone().unwrap_or_else(|| runs.join("data").join(&arguments.robot));
     let out = arguments.out.clone().unwrap_or_else(|| runs.join("priors").join(&arguments.robot));
@@ -191,7 +188,7 @@ fn open_trainer(
         if insist {
             return Err(anyhow!("{}: --resume expected an interrupted training, found none", state.display()));
         }
-        if let Some(file) = ["prior.json", "curve.csv"].map(|name| out.join(name)).iter().find(|f| f.exists()) {
+        if let Some(file) = result_in(out) {
             let state = state.display();
             return Err(anyhow!(
                 "{}: exists without {state} beside it: choose another --out or remove it",
@@ -213,6 +210,15 @@ fn open_trainer(
     }
     program::say!("{} epochs are finished already", trainer.curve().len());
     Ok(trainer)
+}
+
+/// A file in `out` that this program would replace or, with the name of weights, remove.
+fn result_in(out: &Path) -> Option<PathBuf> {
+    let named = ["prior.json", "curve.csv", "curve.svg", "curve.png"].map(|name| out.join(name));
+    let weights = std::fs::read_dir(out).into_iter().flatten().flatten().map(|entry| entry.path());
+    let weights =
+        weights.filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("weights-")));
+    named.into_iter().filter(|path| path.exists()).chain(weights).next()
 }
 
 /// Epochs until the end; false where interrupted.

@@ -37,16 +37,14 @@ pub fn learning_curve(robot: &str, curve: &[EpochReport]) -> Figure {
     }
 }
 
-/// The pictures of a calibration report with their file names.
+/// File names of the pictures of a calibration report.
+pub const CALIBRATION: [&str; 5] = ["likelihood", "sharpening", "coverage", "ranks", "confusion"];
+
+/// These pictures with their file names.
 #[must_use]
 pub fn calibration(robot: &str, report: &Calibration) -> Vec<(&'static str, Figure)> {
-    vec![
-        ("likelihood", likelihood(robot, report)),
-        ("sharpening", sharpening(robot, report)),
-        ("coverage", coverage(robot, report)),
-        ("ranks", ranks(robot, report)),
-        ("confusion", confusion(robot, report)),
-    ]
+    let figures = [likelihood, sharpening, coverage, ranks, confusion].map(|draw| draw(robot, report));
+    CALIBRATION.into_iter().zip(figures).collect()
 }
 
 fn statics(report: &Calibration) -> impl Iterator<Item = &ParameterReport> {

@@ -25,7 +25,7 @@ Examples:
 const MAGIC: &[u8] = b"RRF";
 
 fn main() -> ExitCode {
-    program::finish(run(&Arguments::parse()))
+    program::finish(run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
@@ -33,6 +33,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let trace_file = if episode.is_dir() { episode.join("trace.json") } else { episode.clone() };
     let trace = recording::read(&trace_file)?;
     let out = arguments.out.clone().unwrap_or_else(|| trace_file.with_file_name("episode.rrd"));
+    whole_file::check_file(&out)?;
     // A recording is replaced by a newer one, and nothing else is.
     if std::fs::read(&out).is_ok_and(|there| !there.starts_with(MAGIC)) {
         bail!("{}: exists, and is not a recording of the viewer: choose another --out", out.display());

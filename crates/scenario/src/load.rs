@@ -98,9 +98,11 @@ pub fn find_root(start: &Path) -> Result<PathBuf, Error> {
 ///
 /// # Errors
 ///
-/// [`Error::Root`] where there is none.
+/// [`Error::Robot`] where there is none, and where the folder that is named is no project.
 pub fn project_root(given: Option<&Path>) -> Result<PathBuf, Error> {
-    given.map_or_else(|| find_root(Path::new(".")), |root| Ok(root.to_path_buf()))
+    let Some(root) = given else { return find_root(Path::new(".")) };
+    physics_model::robot::check_root(root)?;
+    Ok(root.to_path_buf())
 }
 
 fn locate(kind: &'static str, name: &str, folder: &Path) -> Result<PathBuf, Error> {

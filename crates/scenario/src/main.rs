@@ -79,7 +79,7 @@ Examples:
   cargo xtask scenario check D4 --set task.horizon=20 --json";
 
 fn main() -> ExitCode {
-    program::finish(run(&Arguments::parse().task))
+    program::finish(run(&program::parse::<Arguments>().task))
 }
 
 fn run(task: &Task) -> Result<()> {

@@ -13,6 +13,7 @@
 //! ```
 
 mod owner;
+mod place;
 mod plain;
 
 use std::cell::Cell;
@@ -22,6 +23,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Once;
 
 pub use owner::{Owner, check_owner};
+pub use place::{check_file, check_folder};
 pub use plain::plain;
 
 /// What to do with a file that is already there.

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use crate::Error;
 
-/// What marks a folder as that of results, and of which.
+/// What marks a folder as that of results, and of which. Each is the file without which a program of the project reads no such folder. [`Owner`] cannot take the place of
+/// this list: what older versions made, and all published results, have these files and no `.owner`.
 const MARKS: [(&str, &str); 6] = [
     ("run.json", "an evaluation"),
     ("plan.json", "a dataset or a benchmark"),
@@ -15,7 +16,8 @@ const MARKS: [(&str, &str); 6] = [
     ("report.json", "a diagnosis"),
 ];
 
-/// Refuses a folder that holds results of another kind than those that `own` marks: they would be mixed, and programs that read the folder mistaken.
+/// Refuses a folder that holds results of another kind than those that `own` marks: they would be mixed, and programs that read the folder mistaken. Refuses as well what
+/// is no folder and cannot become one.
 ///
 /// # Errors
 ///
@@ -31,6 +33,7 @@ const MARKS: [(&str, &str); 6] = [
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn check_owner(folder: &Path, own: &str) -> Result<(), Error> {
+    crate::check_folder(folder)?;
     match MARKS.iter().find(|(mark, _)| *mark != own && folder.join(mark).exists()) {
         Some((mark, what)) => {
             let reason = format!("it holds {what} ({mark}), choose another folder");
@@ -54,7 +57,7 @@ impl Owner {
     /// The file that says it.
     pub const FILE: &str = ".owner";
 
-    /// Refuses a folder with results of another owner, and one that holds any of `files` without saying whose they are.
+    /// Refuses a folder with results of another owner, one that holds any of `files` without saying whose they are, and what cannot become a folder.
     ///
     /// # Errors
     ///
@@ -73,10 +76,14 @@ impl Owner {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn check(&self, folder: &Path, files: &[&str]) -> Result<(), Error> {
+        crate::check_folder(folder)?;
         let refuse = |reason: String| {
             let reason = format!("{reason}: choose another folder");
             Err(Error::at("use", folder)(io::Error::new(io::ErrorKind::AlreadyExists, reason)))
         };
+        if let Some(file) = files.iter().find(|file| folder.join(file).is_dir()) {
+            return refuse(format!("expected a file {file} or none, found a folder"));
+        }
         match std::fs::read_to_string(folder.join(Self::FILE)) {
             Ok(text) if text == self.text() => Ok(()),
             Ok(text) => {
@@ -85,7 +92,6 @@ impl Owner {
                 let of = if subject.is_empty() { String::new() } else { format!(" for {subject}") };
                 refuse(crate::one_line(&format!("it holds results of {program}{of}"), 400))
             }
-            // A folder of that name cannot be written over: that is another complaint.
             Err(_) => match files.iter().find(|file| is_there(&folder.join(file))) {
                 Some(file) => refuse(format!("it holds {file}, which {} did not write", self.program)),
                 None => Ok(()),
@@ -130,6 +136,16 @@ mod tests {
         let other = Owner { program: "diagnose", subject: "a".into() };
         let message = other.check(folder.path(), &["model.toml"]).unwrap_err().source.to_string();
         assert_eq!(message, "it holds results of demo: choose another folder");
+        // A folder by the name of a result, and a file where the folder should be.
+        std::fs::create_dir(folder.path().join("model.toml")).unwrap();
+        let message = other.check(folder.path(), &["model.toml"]).unwrap_err().source.to_string();
+        assert_eq!(message, "expected a file model.toml or none, found a folder: choose another folder");
+        for refused in [
+            other.check(&folder.path().join("notes.txt"), &[]),
+            check_owner(&folder.path().join("notes.txt"), "run.json"),
+        ] {
+            assert_eq!(refused.unwrap_err().source.to_string(), "expected a folder or nothing there, found a file");
+        }
         // A folder that is not there yet is anybody's.
         other.check(&folder.path().join("none"), &["model.toml"]).unwrap();
     }

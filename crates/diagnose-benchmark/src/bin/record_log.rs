@@ -47,7 +47,7 @@ Examples:
   cargo xtask record-log --domain D1 --actions designed --out runs/rehearsal/level";
 
 fn main() -> ExitCode {
-    program::finish(run(&Arguments::parse()))
+    program::finish(run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
@@ -59,12 +59,12 @@ fn run(arguments: &Arguments) -> Result<()> {
         ..Selection::new(&root)
     };
     let problem = Problem::assemble(&selection.load()?, &root)?;
-    let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
     whole_file::check_owner(&arguments.out, "log.toml")?;
     let model_file = arguments.out.join("model.toml");
     if !arguments.out.join("log.toml").exists() && model_file.exists() {
         bail!("{}: exists without log.toml beside it: choose another --out", model_file.display());
     }
+    let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
     match measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new()) {
         Err(taken @ measured_log::Error::Exists { .. }) => return Err(taken.into()),
         Err(error) => return Err(Failed(error.to_string().into()).into()),

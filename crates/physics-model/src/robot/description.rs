@@ -23,6 +23,19 @@ pub fn find_root(start: &Path) -> Result<PathBuf, RobotError> {
         .ok_or(RobotError::Root { start: absolute.clone() })
 }
 
+/// Refuses a project folder that somebody named and that is none.
+///
+/// # Errors
+///
+/// [`RobotError::NoProject`] where `root` does not hold `scenarios/base.toml`.
+pub fn check_root(root: &Path) -> Result<(), RobotError> {
+    if root.join("scenarios/base.toml").is_file() {
+        Ok(())
+    } else {
+        Err(RobotError::NoProject { path: root.to_path_buf() })
+    }
+}
+
 impl RobotConfig {
     /// Reads the table `[robot]` of a TOML file. A scenario's file of an arm has other tables as well: those are the scenario's.
     ///

@@ -14,6 +14,12 @@ pub enum RobotError {
         /// Where the search began.
         start: PathBuf,
     },
+    /// A folder that was named as the project's and is not.
+    #[error("--root {}: expected a project folder, which holds scenarios/base.toml", .path.display())]
+    NoProject {
+        /// The folder.
+        path: PathBuf,
+    },
     /// The description of an arm cannot be read.
     #[error("{}: cannot be read, expected a TOML file with a table [robot]", .path.display())]
     Open {

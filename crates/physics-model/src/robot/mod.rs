@@ -26,7 +26,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector6};
 
 pub use chain::{GRAVITY_MPS2, Jacobian, JointVector, MassMatrix};
 pub use config::{JointLimit, RobotConfig};
-pub use description::find_root;
+pub use description::{check_root, find_root};
 pub use error::{IkError, RobotError};
 pub use ik::IkOptions;
 pub use shapes::ToolShape;

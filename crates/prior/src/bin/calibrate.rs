@@ -8,6 +8,7 @@ use clap::Parser;
 use dataset::Reader;
 use prior::calibrate::{Calibration, calibrate};
 use prior::features::{self, ActionInput};
+use prior::pictures::CALIBRATION;
 use prior::{Checkpoint, Episode, Inference, Layout, Models, Sequence, TrainConfig, write_atomically};
 use program::typed;
 
@@ -46,19 +47,24 @@ Examples:
   cargo xtask datagen --seed 2 --out runs/held-out/sawyer
   cargo xtask calibrate --out runs/calibration/sawyer";
 
+/// The report.
+const REPORT: &str = "calibration.json";
+/// Size of a report, at most; one of 6000 episodes has 120 kB.
+const MOST_BYTES: u64 = 64 << 20;
+/// Keys of a report of every version.
+const KEYS: [&str; 4] = ["episodes", "nll", "baseline_nll", "parameters"];
+
 fn main() -> ExitCode {
-    program::finish(run(&Arguments::parse()))
+    program::finish(run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = match &arguments.root {
-        Some(root) => root.clone(),
-        None => prior::project_root(&std::env::current_dir()?),
-    };
+    let root = prior::project_root(arguments.root.as_deref(), &std::env::current_dir()?)?;
     let robot = &arguments.robot;
     let folder = arguments.prior.clone().unwrap_or_else(|| prior::default_folder(&root, robot, false));
     let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(robot));
     let out = arguments.out.clone().unwrap_or_else(|| folder.clone());
+    check_out(&out)?;
     rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
 
     let checkpoint = Checkpoint::load(&folder, None)?;
@@ -99,7 +105,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     let models = Models { network: &inference, baseline: &checkpoint.baseline, memoryless: memoryless.as_ref() };
     let calibration = calibrate(models, &layout, features::static_columns(&layout), &episodes);
     let json = serde_json::to_string_pretty(&calibration)? + "\n";
-    write_atomically(&out.join("calibration.json"), json.as_bytes())?;
+    // The report first: pictures beside it are those of a report.
+    write_atomically(&out.join(REPORT), json.as_bytes())?;
     for (name, figure) in prior::pictures::calibration(robot, &calibration) {
         figure.save(&out.join(name))?;
     }
@@ -107,10 +114,33 @@ fn run(arguments: &Arguments) -> Result<()> {
         program::out!("{}", serde_json::to_string(&calibration)?);
     } else {
         print(&calibration);
-        program::say!("written to {}", typed(&out.join("calibration.json")));
+        program::say!("written to {}", typed(&out.join(REPORT)));
         suggest_next(&root, robot, &folder);
     }
     Ok(())
+}
+
+/// Refuses a folder whose files of the names of results are not those of an earlier report. Reports lie beside priors, so the file itself has to
+/// say what it is.
+fn check_out(out: &Path) -> Result<()> {
+    whole_file::check_owner(out, "prior.json")?;
+    let report = out.join(REPORT);
+    if !report.exists() {
+        let pictures = CALIBRATION.iter().flat_map(|name| ["svg", "png"].map(|end| out.join(name).with_extension(end)));
+        return match pictures.into_iter().find(|picture| picture.exists()) {
+            Some(picture) => {
+                Err(anyhow!("{}: exists without {REPORT} beside it: choose another --out", picture.display()))
+            }
+            None => Ok(()),
+        };
+    }
+    let found = whole_file::read(&report, MOST_BYTES).ok().and_then(|text| serde_json::from_slice(&text).ok());
+    let found: serde_json::Value = found.unwrap_or_default();
+    if KEYS.iter().all(|key| found.get(key).is_some()) {
+        Ok(())
+    } else {
+        Err(anyhow!("{}: exists, and is not a report of this program: choose another --out", report.display()))
+    }
 }
 
 /// The network without memory that is compared with `checkpoint`: the same data, seed and settings, but for its memory.

@@ -70,7 +70,7 @@ Examples:
 const FAILED: Failed = Failed::new("the episode was not shown");
 
 fn main() -> ExitCode {
-    program::finish(run(&Arguments::parse()))
+    program::finish(run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {

@@ -14,7 +14,7 @@ use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
 #[derive(Debug, Parser)]
 #[command(name = "report", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Folder of the run: runs/eval/…, runs/all, runs/demo/…, or a published one of assets/results.
+    /// Folder of the run: runs/eval/…, runs/all, runs/demo/…, or published ones: assets/results, assets/results/table1-surmise-D4.
     run: PathBuf,
     /// The page [default: report.html in that folder].
     #[arg(long)]
@@ -27,12 +27,16 @@ Examples:
   cargo xtask report runs/eval/D4-sawyer-surmise";
 
 fn main() -> ExitCode {
-    program::finish(run(&Arguments::parse()))
+    program::finish(run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
     let folder = &arguments.run;
     let out = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
+    // A folder that is not there is another complaint.
+    if arguments.out.is_some() {
+        whole_file::check_file(&out)?;
+    }
     if !may_be_replaced(&out) {
         return Err(anyhow!("{}: exists, and is not a page of this program: choose another --out", out.display()));
     }
