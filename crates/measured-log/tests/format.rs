@@ -372,3 +372,32 @@ fn what_a_message_quotes_is_one_line_and_cut() {
     let torn = refused(&torn, b"");
     assert!(torn.contains("log.toml, key `a b`: there is no key `a b`"), "{torn}");
 }
+
+/// Code blocks of a page of the book in a language.
+fn blocks(page: &str, language: &str) -> Vec<String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src").join(page);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let parts = text.split("```").skip(1).step_by(2);
+    parts.filter_map(|part| part.strip_prefix(language)?.strip_prefix('\n')).map(String::from).collect()
+}
+
+#[test]
+fn the_samples_in_the_book_are_logs() {
+    // As many episodes as the split needs, each like the one that is shown.
+    let rows = &blocks("guides/diagnose.md", "csv")[0];
+    let (head, rows) = rows.split_once('\n').unwrap();
+    assert!(rows.lines().count() >= 3 && rows.lines().all(|row| row.starts_with("0,")), "{rows}");
+    let mut samples = format!("{head}\n");
+    for episode in 0..10 {
+        samples.extend(rows.lines().map(|row| format!("{episode}{}\n", &row[1..])));
+    }
+    for page in ["guides/diagnose.md", "reference/measured-log.md"] {
+        let headers = blocks(page, "toml");
+        assert_eq!(headers.len(), 1, "{page}");
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("log.toml"), &headers[0]).unwrap();
+        std::fs::write(folder.path().join("samples.csv"), &samples).unwrap();
+        let log = measured_log::read(folder.path()).unwrap_or_else(|error| panic!("{page}: {error}"));
+        assert_eq!(log.episodes.len(), 10, "{page}");
+    }
+}
