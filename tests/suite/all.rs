@@ -11,7 +11,7 @@ use serde_json::Value;
 const RUNS: &str = "--all --only table1-paper-D4,table1-surmise-D3,table1-surmise-D5,table2-paper,table2-paper-mujoco,\
                     ablation-rejection-filter --quick --trials 2 --set task.horizon=4 --set planner.budget={transitions=60} \
                     --set belief.rejection.particles=30 --set belief.rejection.max_attempts=90 \
-                    --set belief.weighted.particles_min=10 --set belief.weighted.restart_transitions=300 \
+                    --set belief.bridge.draws=20 --set belief.bridge.effective=10 \
                     --python no-such-python";
 
 fn all(rest: &str, out: &Path) -> Output {

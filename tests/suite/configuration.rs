@@ -61,7 +61,11 @@ fn the_table_is_aligned_and_can_be_cut_to_a_part() {
 
 #[test]
 fn a_resolved_scenario_of_a_run_is_explained_by_its_file() {
-    let file = "assets/results/table1-surmise-D4/scenario.toml";
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("run").display().to_string();
+    let played = run("eval", &format!("--domain D1 --methods heuristic --trials 1 --quick --out {out}"));
+    assert!(played.status.success(), "{}", stderr(&played));
+    let file = format!("{out}/scenario.toml");
     let report: Value = serde_json::from_str(&stdout(&format!("check {file} --json"))).unwrap();
     let layers = report["keys"].as_array().unwrap().iter().map(|key| key["from"]["layer"].as_str().unwrap());
     assert_eq!(layers.filter(|layer| !["domain", "format"].contains(layer)).count(), 0);

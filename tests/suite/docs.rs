@@ -100,7 +100,7 @@ fn every_option_in_the_documents_exists() {
 /// Verbs that a verb has of its own.
 fn verbs_of(verb: &str) -> &'static [&'static str] {
     match verb {
-        "bench" => &["physics", "belief", "planner", "prior", "accuracy"],
+        "bench" => &["physics", "calibration", "nudge", "planner", "prior", "accuracy"],
         "import-log" => &["contactnets", "cmu-push"],
         "scenario" => &["check", "schema"],
         _ => &[],

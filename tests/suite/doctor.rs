@@ -32,7 +32,15 @@ fn state(report: &Value, name: &str) -> String {
 fn the_machine_that_built_this_has_what_is_required_to_build() {
     let output = program("xtask").args(["doctor", "--json", "--python", "/nowhere/python"]).output().unwrap();
     let report = report(&output);
-    for name in ["rustc", "cargo", "C compiler", "writing the build", "prior of sawyer", "prior of jaco"] {
+    for name in [
+        "rustc",
+        "cargo",
+        "C compiler",
+        "writing the build",
+        "prior of sawyer",
+        "prior of jaco",
+        "prior of sawyer-fixed",
+    ] {
         assert_eq!(state(&report, name), "ok", "{report:#}");
     }
     assert_eq!(state(&report, "python modules"), "missing");

@@ -30,7 +30,7 @@ impl<'a> Agent<'a> {
         }
         let filter = problem.scenario.belief.filter;
         match (method, filter) {
-            (Method::RnnMax | Method::RnnSampling, Filter::Weighted) => {
+            (Method::RnnMax | Method::RnnSampling, Filter::Bridge) => {
                 return Err(Error::NoDensity { method: method.name() });
             }
             (Method::Mixture, Filter::Rejection) => return Err(Error::NoWeights { method: method.name() }),

@@ -1,25 +1,28 @@
 //! What chooses actions and learns from their answers: one small interface for the method and its baselines.
 
-mod filtered;
+mod bridge;
 mod heuristic;
 mod oracle;
+mod rejection;
 
 use belief::Particles;
 use planner::SearchReport;
 use pomdp::{Policy, Seed, UpdateReport};
 use prior::Suggester;
 use push_task::{Action, GoalPolicy, HeuristicPolicy, Observation, Particle, PushModel};
-use scenario::{Problem, Rollouts};
+use scenario::{Filter, Problem, Rollouts};
 
 use crate::record::End;
 use crate::{Error, Method, WorldStep};
-use filtered::FilteredController;
-pub use filtered::with_known_joints;
+use bridge::BridgeController;
+pub use bridge::history;
 use heuristic::HeuristicController;
 use oracle::OracleController;
+use rejection::RejectionController;
 
+pub(crate) use rejection::obstacle_share;
 #[cfg(test)]
-pub(crate) use filtered::obstacle_share;
+pub(crate) use rejection::with_known_joints;
 
 /// An action that was chosen.
 #[derive(Debug)]
@@ -82,7 +85,10 @@ pub(crate) fn controller<'a>(
         Method::Heuristic => Box::new(HeuristicController::new(&problem.model, first)),
         Method::Oracle => Box::new(OracleController::new(problem, seed)?),
         Method::NoRnn | Method::RnnMax | Method::RnnSampling | Method::Mixture => {
-            Box::new(FilteredController::new(problem, method, prior, first.0, seed)?)
+            match problem.scenario.belief.filter {
+                Filter::Rejection => Box::new(RejectionController::new(problem, method, prior, first.0, seed)?),
+                Filter::Bridge => Box::new(BridgeController::new(problem, prior, first.0, seed)?),
+            }
         }
     })
 }

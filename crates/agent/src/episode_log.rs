@@ -44,7 +44,7 @@ impl<'a> EpisodeLog<'a> {
         self.watcher.see(&StepView { joints_rad, truth, belief, search, step: Some(&record) });
         self.compare(truth, belief);
         self.depletions += usize::from(match update {
-            Update::Belief { report, .. } => report.acceptance == 0.0 || report.recoveries > 0,
+            Update::Belief { report, .. } => report.acceptance == 0.0,
             Update::End(end) => matches!(end, End::OutOfParticles { .. }),
             Update::NoBelief => false,
         });

@@ -21,9 +21,9 @@ pub enum Error {
         /// Method.
         method: &'static str,
     },
-    /// The weighted filter needs the density of all draws, which is not known of those that were chosen by the observation.
+    /// The bridge filter needs the density of all draws, which is not known of those that were chosen by the observation.
     #[error(
-        "method {method} does not go with belief.filter = \"weighted\", which needs the density of its suggestions: use mixture, no-rnn, oracle or heuristic, or --preset paper"
+        "method {method} does not go with belief.filter = \"bridge\", which needs the density of its suggestions: use mixture, no-rnn, oracle or heuristic, or --preset paper"
     )]
     NoDensity {
         /// Method.

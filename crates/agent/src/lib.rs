@@ -32,17 +32,19 @@ mod external;
 mod method;
 mod proposals;
 mod record;
+mod teacher;
 mod watch;
 mod world;
 
 pub use agent::Agent;
 pub use belief_errors::BeliefErrors;
-pub use controller::with_known_joints;
+pub use controller::history;
 pub use error::Error;
 pub use external::{
     ExternalEpisode, ExternalWorld, LINE_LIMIT_BYTES, PROTOCOL, Timeouts, WorldAddress, WorldError, WorldIdentity,
 };
 pub use method::Method;
 pub use record::{Episode, Reason, StepRecord};
+pub use teacher::Estimate;
 pub use watch::{StepView, Watcher};
 pub use world::{SimulatedWorld, World, WorldStep};

@@ -1,10 +1,9 @@
 //! {s, Θ} ~ RNN(o): how what the network suggests becomes particles.
 
 use belief::Particles;
-use physics_model::BodyState;
-use pomdp::{Belief as _, Prior as _, Rng};
+use pomdp::{Prior as _, Rng};
 use prior::Suggester;
-use push_task::sampling::effects::{log_density as log_density_of_effects, sample as sample_effects};
+use push_task::sampling::effects::sample as sample_effects;
 use push_task::{Action, Observation, Particle, PushModel};
 use scenario::Problem;
 
@@ -39,36 +38,19 @@ impl<'a> Proposer<'a> {
         Self { problem, method, prior }
     }
 
-    /// The belief before `action` with the network's births, and the network's suggestions after it.
-    ///
-    /// # Errors
-    ///
-    /// Never for weights that are a distribution.
+    /// The network's suggestions after `action`; `belief` is that before it.
     pub(crate) fn propose(
         &mut self,
-        belief: Particles<Particle>,
+        belief: &Particles<Particle>,
         action: Action,
         context: &Context<'_>,
         rng: &mut Rng,
-    ) -> Result<(Particles<Particle>, Vec<Particle>), belief::Error> {
-        let config = &self.problem.scenario.agent;
-        let belief = with_births(context.model, self.prior, belief, config.birth_share, rng)?;
+    ) -> Vec<Particle> {
+        let count = self.problem.scenario.agent.proposals;
         self.prior.suggest(Some(&action), context.observation);
-        let mut proposals = suggest(self.prior, self.method, context, config.proposals, rng);
-        complete_effects(self.problem, &belief, &mut proposals, rng);
-        Ok((belief, proposals))
-    }
-
-    /// Whether proposals are all of the draws, so that their density is known.
-    pub(crate) fn knows_density(&self) -> bool {
-        self.method == Method::Mixture
-    }
-
-    /// ln of the density that proposals are drawn from, at a particle.
-    pub(crate) fn log_density(&self, particle: &Particle) -> f64 {
-        let mobility = self.problem.model.config().world.obstacle_mobility;
-        let log_density = self.prior.log_density(mobility, particle);
-        log_density + log_density_of_effects(&self.problem.beliefs.effects, &particle.theta.effects)
+        let mut proposals = suggest(self.prior, self.method, context, count, rng);
+        complete_effects(self.problem, belief, &mut proposals, rng);
+        proposals
     }
 }
 
@@ -89,10 +71,6 @@ pub(crate) fn suggest(
         fits.then_some(particle)
     };
     let table_height_m = context.model.config().world.table_height_m;
-    if method == Method::Mixture {
-        // All of them: leaving out what does not fit would change the density that they are drawn from.
-        return (0..count).filter_map(|_| prior.sample_raw(table_height_m, rng)).collect();
-    }
     if method == Method::RnnMax {
         let strongest = prior.strongest(table_height_m).and_then(complete);
         return strongest.into_iter().flat_map(|particle| std::iter::repeat_n(particle, count)).collect();
@@ -115,56 +93,4 @@ fn complete_effects(problem: &Problem, belief: &Particles<Particle>, proposals: 
         particle.theta.effects = sample_effects(&problem.beliefs.effects, rng);
         particle.memory.clone_from(&memory);
     }
-}
-
-/// Draws from the network's latest suggestion, each with the measured part of a state of the belief, take `share` of its probability:
-/// b ← (1 − ε) b + ε q.
-///
-/// Importance weights alone move a filter among the structures that it has; one that it gave up, or that its first belief did not know of
-/// (an obstacle), has no state to start from. The network was trained on complete episodes, so q is a posterior given the same history: the belief
-/// forgets a little of what it computed, and can be brought back by what the network makes of the same sensors. Must be called before the
-/// suggestion takes in the next observation, as the belief does not know it yet either.
-///
-/// The particle count rises by `share` of it. Draws that are no possible world are left out, and the share with them.
-pub(crate) fn with_births(
-    model: &PushModel,
-    prior: &Suggester,
-    belief: Particles<Particle>,
-    share: f64,
-    rng: &mut Rng,
-) -> Result<Particles<Particle>, belief::Error> {
-    let wanted = (share * belief.count() as f64).ceil() as usize;
-    let table_height_m = model.config().world.table_height_m;
-    let births: Vec<Particle> = (0..wanted)
-        .filter_map(|_| {
-            let base = belief.sample(rng).clone();
-            let draw = prior.sample(table_height_m, rng)?;
-            let born = born(model, base, draw);
-            model.check(&born).is_ok().then_some(born)
-        })
-        .collect();
-    if births.is_empty() {
-        return Ok(belief);
-    }
-    let share = share * births.len() as f64 / wanted as f64;
-    let mut weights: Vec<f64> = belief.iter().map(|(_, weight)| (1.0 - share) * weight).collect();
-    weights.extend(std::iter::repeat_n(share / births.len() as f64, births.len()));
-    let mut states = belief.into_states();
-    states.extend(births);
-    Particles::weighted(states, weights)
-}
-
-/// Θ and obstacle of `draw`, the rest of `base`: its object stands where it was, at the height of its new shape.
-fn born(model: &PushModel, base: Particle, draw: Particle) -> Particle {
-    let object = &draw.theta.object;
-    let [x, y, _] = base.state.object.position_m;
-    let z = model.config().world.table_height_m + object.shape.half_height_m(object.size_m);
-    let mut born = base;
-    born.state.object = BodyState::at_rest([x, y, z], born.state.object.yaw_rad());
-    born.state.obstacle = draw.state.obstacle;
-    // Effects are none of the network's.
-    let effects = std::mem::take(&mut born.theta.effects);
-    born.theta = draw.theta;
-    born.theta.effects = effects;
-    born
 }

@@ -8,9 +8,14 @@ use push_task::{Action, Observation, Particle};
 use scenario::{Problem, Selection, find_root};
 
 fn problem(domain: &str, set: &[&str]) -> Problem {
+    preset("paper", domain, set)
+}
+
+fn preset(preset: &str, domain: &str, set: &[&str]) -> Problem {
     let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
     let set = set.iter().map(ToString::to_string).collect();
-    let selection = Selection { domain: domain.into(), quick: true, set, ..Selection::new(&root) };
+    let selection =
+        Selection { preset: preset.into(), domain: domain.into(), quick: true, set, ..Selection::new(&root) };
     Problem::assemble(&selection.load().unwrap(), &root).unwrap()
 }
 
@@ -45,14 +50,15 @@ fn the_same_seed_plays_the_same_episode() {
     assert_eq!(play(Seed(3)), first);
     assert_ne!(play(Seed(4)), first);
     for step in &first.steps {
-        assert!(step.transitions > 0 && step.transitions <= 100 + problem.scenario.belief.transitions(), "{step:?}");
+        let most = problem.scenario.belief.rejection.max_attempts;
+        assert!(step.transitions > 0 && step.transitions <= 100 + most, "{step:?}");
     }
 }
 
 #[test]
-fn the_weighted_filter_keeps_the_belief_through_an_episode_within_its_transitions() {
-    let set = ["belief.filter=\"weighted\"", "planner.budget={transitions=100}", "task.horizon=8"];
-    let problem = problem("D4", &set);
+fn the_bridge_filter_keeps_the_belief_through_an_episode_within_its_transitions() {
+    let problem = preset("surmise", "D4", &["planner.budget={transitions=100}", "task.horizon=8"]);
+    let config = &problem.scenario.belief.bridge;
     let play = |seed| {
         let mut agent = Agent::new(&problem, Method::NoRnn, None).unwrap();
         agent.run(&mut world(&problem, seed), seed).unwrap()
@@ -60,16 +66,33 @@ fn the_weighted_filter_keeps_the_belief_through_an_episode_within_its_transition
     let first = play(Seed(3));
     assert_eq!(play(Seed(3)), first);
     assert!(first.steps.len() == 8 || first.reason != Reason::Horizon, "{:?}", first.reason);
-    for step in &first.steps {
-        assert!(step.transitions > 0 && step.transitions <= 100 + problem.scenario.belief.transitions(), "{step:?}");
+    for (index, step) in first.steps.iter().enumerate() {
+        let most = config.draws * (index + 1 + config.kept);
+        assert!(step.transitions > 0 && step.transitions <= 100 + most, "{step:?}");
     }
     let updates: Vec<_> = first.steps.iter().filter_map(|s| s.update.as_ref()).collect();
     assert!(updates.len() >= 4, "{} updates", updates.len());
     for update in updates {
-        assert!(update.effective_sample_size >= 1.0 && !update.structures.is_empty(), "{update:?}");
-        let total: f64 = update.structures.iter().map(|s| s.posterior).sum();
-        assert!((total - 1.0).abs() < 1e-9, "{total}");
+        assert!(update.effective_sample_size >= config.effective * (1.0 - 1e-6), "{update:?}");
+        assert!((0.0..=1.0).contains(&update.temperature), "{update:?}");
     }
+}
+
+#[test]
+fn the_network_brings_an_unknown_obstacle_into_the_bridge_filter() {
+    let problem = preset("surmise", "obstacle", &["planner.budget={transitions=60}", "task.horizon=4"]);
+    let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let folder = root.join("assets/priors/sawyer-fixed");
+    let network = prior::Suggester::load(&folder, "sawyer", &problem.model).unwrap();
+    let shares = |method, network| {
+        let mut agent = Agent::new(&problem, method, network).unwrap();
+        let episode = agent.run(&mut world(&problem, Seed(5)), Seed(5)).unwrap();
+        let shares: Vec<f64> = episode.steps.iter().filter_map(|s| s.obstacle_share).collect();
+        assert!(!shares.is_empty());
+        shares
+    };
+    assert!(shares(Method::Mixture, Some(&network)).iter().all(|share| *share > 0.0 && *share < 1.0));
+    assert!(shares(Method::NoRnn, None).iter().all(|share| *share == 0.0));
 }
 
 #[test]
@@ -80,10 +103,10 @@ fn a_method_that_needs_a_prior_says_so() {
     }
     let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
     let prior = prior::Suggester::load(&root.join("assets/priors/sawyer"), "sawyer", &problem.model).unwrap();
-    let weighted = self::problem("D1", &["belief.filter=\"weighted\""]);
+    let bridge = self::problem("D1", &["belief.filter=\"bridge\""]);
     let unweighted = Agent::new(&problem, Method::Mixture, Some(&prior));
     assert!(matches!(unweighted, Err(Error::NoWeights { .. })), "the filter has no weights");
-    let refused = Agent::new(&weighted, Method::RnnSampling, Some(&prior));
+    let refused = Agent::new(&bridge, Method::RnnSampling, Some(&prior));
     assert!(matches!(refused, Err(Error::NoDensity { .. })), "the filter needs the density of what is suggested");
 }
 

@@ -7,7 +7,7 @@ pub enum Error {
     /// No particle explains the observation, perturbed ones and proposals included.
     #[error(
         "depleted: none of {attempts} simulated particles agrees with the observation ({diverged} diverged, {terminal} ended the \
-         episode), and no proposal or restart explains it either"
+         episode), and no proposal explains it either"
     )]
     Depleted {
         /// Transitions simulated.
@@ -42,9 +42,6 @@ pub enum Error {
         /// The sum.
         sum: f64,
     },
-    /// Proposals came without the density that they were drawn from.
-    #[error("proposals need their density (`Proposals::weighted`), or `proposal_share` must be 0")]
-    ProposalDensity,
     /// A configured value lies outside its limits.
     #[error("belief: `{key}` is {value}, but must be {limit}")]
     Config {

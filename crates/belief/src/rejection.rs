@@ -22,8 +22,7 @@ use crate::{Error, Particles, RejectionConfig};
 /// on. A diverged world has likelihood zero. It is dropped and counted.
 ///
 /// `log_evidence` is ln(acceptance) of phase 1 alone, because perturbed particles do not come from b. `acceptance`
-/// covers both phases. The density of proposals is not used. Every attempt costs one clone of a state and one
-/// transition.
+/// covers both phases. Every attempt costs one clone of a state and one transition.
 #[derive(Clone, Debug)]
 pub struct RejectionFilter {
     config: RejectionConfig,

@@ -74,7 +74,7 @@ fn update(
         belief,
         &action,
         &observation,
-        Proposals::unweighted(proposals),
+        Proposals::new(proposals),
         &mut rng,
     )?;
     Ok((belief.into_states(), report))

@@ -141,7 +141,7 @@ fn equal_seeds_give_equal_beliefs_and_other_seeds_others() {
     let run = |item| {
         let mut rng = Seed(1).stream(Purpose::Test, item);
         let belief = Particles::uniform(vec![0, 1, 2]).unwrap();
-        filter(100).update(&Markov, belief, &0, &1, Proposals::unweighted(&[0, 1]), &mut rng).unwrap()
+        filter(100).update(&Markov, belief, &0, &1, Proposals::new(&[0, 1]), &mut rng).unwrap()
     };
     assert_eq!(run(1), run(1));
     assert_ne!(run(1), run(2));

@@ -19,8 +19,9 @@
 //! ```
 
 pub mod accuracy;
-pub mod belief;
+pub mod calibration;
 pub mod closed_forms;
+pub mod nudge;
 pub mod peer;
 pub mod physics;
 pub mod planner;

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
-use bench::{belief, planner, prior, report};
+use bench::{calibration, nudge, planner, prior, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
 use serde_json::Value;
@@ -36,22 +36,50 @@ enum What {
         #[arg(long)]
         json: bool,
     },
-    /// The filters of the presets on the pushing task: depletion, effective size, errors of the estimated parameters.
-    #[command(after_help = "Examples:\n  cargo xtask bench belief --episodes 4 --quick")]
-    Belief {
+    /// How far the belief can be trusted, step by step, on fresh worlds: beside prior and network.
+    #[command(
+        after_help = "Examples:\n  cargo xtask bench calibration --domain D4 --worlds 4 --quick --out runs/calibration/D4-quick"
+    )]
+    Calibration {
         /// Domain: D1 to D5, or a scenario file.
         #[arg(long, default_value = "D4")]
         domain: String,
+        /// Arm: sawyer, jaco, or a robot file.
+        #[arg(long)]
+        robot: Option<String>,
         /// Worlds.
-        #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-        episodes: u32,
+        #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+        worlds: u32,
         /// Root seed.
         #[arg(long, default_value_t = 1)]
         seed: u64,
         /// The small budgets of --quick runs.
         #[arg(long)]
         quick: bool,
-        /// Overrides a scenario entry of both presets: key=value.
+        /// Overrides a scenario entry: key=value.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+        /// Folder of the network [default: the one trained here, else the shipped one].
+        #[arg(long)]
+        prior: Option<PathBuf>,
+        /// Folder of the results. Worlds that it has are not played again.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+    /// How far the next reading moves where the object is moved by a hair, in recorded trials: the chaos of a push.
+    #[command(
+        after_help = "Examples:\n  cargo xtask bench nudge --domain D4 assets/results/table1-surmise-D4/trials.jsonl"
+    )]
+    Nudge {
+        /// File `trials.jsonl` of a run of `eval`.
+        trials: PathBuf,
+        /// Its domain.
+        #[arg(long, default_value = "D4")]
+        domain: String,
+        /// How far the object is moved along y, m.
+        #[arg(long, default_value_t = 1e-8)]
+        nudge_m: f64,
+        /// Overrides a scenario entry: key=value.
         #[arg(long = "set", value_name = "KEY=VALUE")]
         set: Vec<String>,
     },
@@ -132,16 +160,22 @@ fn run(arguments: &Arguments) -> Result<()> {
                 program::show(&table(&result));
             }
         }
-        What::Belief { domain, episodes, seed, quick, set } => {
-            let task = belief::Task {
+        What::Calibration { domain, robot, worlds, seed, quick, set, prior, out } => {
+            let task = calibration::Task {
                 domain: domain.clone(),
-                episodes: u64::from(*episodes),
+                robot: robot.clone(),
+                worlds: *worlds,
                 seed: *seed,
                 quick: *quick,
                 set: set.clone(),
+                prior: prior.clone(),
             };
-            let result = belief::run(&root, &task, |text| program::say!("{text}"))?;
-            program::out!("{}", serde_json::to_string_pretty(&result)?);
+            let summary = calibration::run(&root, &task, out, |text| program::say!("{text}"))?;
+            program::show(&calibration::table(&summary));
+        }
+        What::Nudge { trials, domain, nudge_m, set } => {
+            let task = nudge::Task { domain: domain.clone(), nudge_m: *nudge_m, set: set.clone() };
+            program::out!("{}", serde_json::to_string_pretty(&nudge::run(&root, &task, trials)?)?);
         }
         What::Planner { episodes, quick, only, seed, set, out, json } => {
             let effort = planner::Effort { episodes: *episodes, quick: *quick };

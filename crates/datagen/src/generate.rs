@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use dataset::{Counts, Row};
+use physics_model::BodyState;
 use physics_model::config::ObstacleMobility;
 use pomdp::{Outcome, Policy as _, Purpose, Seed};
 use push_task::{Action, ActionReport, GoalPolicy, HeuristicPolicy, Observation, Particle};
 use rand::RngExt as _;
 use scenario::{Problem, Scenario};
 
+/// Probability a step that a policy imagines another world.
+const CHANGES_ITS_MIND: f64 = 0.2;
 /// Outcome of the last row of an episode that was played to its end.
 const ENDED: u8 = 1;
 /// Outcome of the last row of an episode whose world diverged in the action after it.
@@ -79,13 +82,23 @@ impl Generator {
             diverged: false,
         };
         let goal_directed = policy_rng.random::<f64>() < data.goal_share;
+        let mut imagined = particle.clone();
+        let mut seen = observation;
         for step in 1..=data.episode_actions {
+            if data.imagined_worlds {
+                if step == 1 || policy_rng.random::<f64>() < CHANGES_ITS_MIND {
+                    imagined = problem.sample_world(&mut policy_rng)?;
+                }
+                imagine(&mut imagined, &particle.state.joints_rad, &seen);
+            } else {
+                imagined.clone_from(&particle);
+            }
             let explores = policy_rng.random::<f64>() < data.exploration_share;
             let random = Action::ALL[policy_rng.random_range(0..Action::ALL.len())];
             let action = match (explores, goal_directed) {
                 (true, _) => random,
-                (false, true) => GoalPolicy.action(model, &particle, &mut policy_rng),
-                (false, false) => HeuristicPolicy.action(model, &particle, &mut policy_rng),
+                (false, true) => GoalPolicy.action(model, &imagined, &mut policy_rng),
+                (false, false) => HeuristicPolicy.action(model, &imagined, &mut policy_rng),
             };
             let (result, report) = model.act(&mut particle, action, &mut noise_rng);
             if result.outcome == Outcome::Diverged {
@@ -97,6 +110,7 @@ impl Generator {
             // Reaching the goal does not end a training episode: the network learns the world, not the task.
             let done = Some((action, result.reward, &report));
             episode.rows.push(row(number, step, done, &result.observation, &particle));
+            seen = result.observation;
         }
         if let Some(last) = episode.rows.last_mut() {
             last.outcome = if episode.diverged { DIVERGED } else { ENDED };
@@ -126,6 +140,13 @@ impl Generator {
         }
         Ok((rows, counts))
     }
+}
+
+/// What the arm knows of a world, in one that it imagines: its own joints, and where it sees the object.
+fn imagine(imagined: &mut Particle, joints_rad: &[f64], seen: &Observation) {
+    imagined.state.joints_rad.copy_from_slice(joints_rad);
+    let (position_m, orientation) = seen.object_pose();
+    imagined.state.object = BodyState { orientation, ..BodyState::at_rest(position_m, 0.0) };
 }
 
 /// The row after `done`: action, reward and report.

@@ -55,7 +55,7 @@ impl Evaluation {
         }
         let methods = methods(&request.methods, scenario.belief.filter);
         let problem = Arc::new(Problem::assemble(&scenario, root)?);
-        let default = || prior::default_folder(root, &scenario.robot.name, request.selection.quick);
+        let default = || prior::default_folder(root, &scenario.prior_names(), request.selection.quick);
         let needs_prior = methods.iter().any(|method| method.needs_prior());
         let prior_folder = needs_prior.then(|| request.prior.clone().unwrap_or_else(default));
         let load = |folder: &PathBuf| Suggester::load(folder, &scenario.robot.name, &problem.model);
@@ -168,7 +168,7 @@ fn methods(asked: &[Method], filter: Filter) -> Vec<Method> {
     let mut methods = match filter {
         _ if !asked.is_empty() => asked.to_vec(),
         Filter::Rejection => Method::PUBLISHED.to_vec(),
-        Filter::Weighted => vec![Method::NoRnn, Method::Mixture],
+        Filter::Bridge => vec![Method::NoRnn, Method::Mixture],
     };
     methods.sort();
     methods.dedup();

@@ -294,7 +294,7 @@ fn same_worlds(a: &Scenario, b: &Scenario) -> bool {
         arm: ArmsConfig { truth: a.arm.truth.clone(), model: b.arm.model.clone() },
         effects: EffectsConfig { truth: a.effects.truth.clone(), model: b.effects.model.clone() },
         perturb: b.perturb.clone(),
-        model_error: b.model_error,
+        transition_noise: b.transition_noise,
         initial_belief: b.initial_belief.clone(),
         belief: b.belief.clone(),
         planner: b.planner.clone(),

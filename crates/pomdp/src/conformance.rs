@@ -6,19 +6,14 @@
 //! | [`ObservationModel`] | [`check_observation_model`]; [`check_discrete_likelihoods`] where observations can be listed |
 //! | [`Discretise`] | [`check_discretise`] |
 //! | [`Perturb`] | [`check_perturb`], [`check_perturb_is_centred`] |
-//! | [`StaticParameters`] | [`check_static_parameters`]; [`check_parameters_stay`] where no action changes any of them |
 //! | [`Density`] | [`check_density`], [`check_density_integrates_to_one`] |
 //! | [`Prior`] | [`check_prior`] |
 //!
 //! Random checks use fixed streams: they fail always or never.
 
-use std::collections::BTreeMap;
 use std::fmt::Debug;
 
-use crate::{
-    Density, Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Prior, Purpose, Rng, Seed,
-    StaticParameters,
-};
+use crate::{Density, Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Prior, Purpose, Rng, Seed};
 
 /// How many standard errors a mean may be off.
 const STANDARD_ERRORS: f64 = 4.0;
@@ -220,66 +215,6 @@ where
             "noise moves value {index} of {start:?} by {mean} on average, {:.1} standard errors from 0",
             mean / error
         );
-    }
-}
-
-/// Parameters that are read and written back stay the same, the structure stays, and all states of a structure have
-/// equally many values.
-///
-/// Each state is also given the parameters of every other state of its structure, where that is possible. Reading them
-/// back must give the same values, to within `tolerance` (relative to 1 + the value).
-///
-/// # Panics
-///
-/// When they do not.
-pub fn check_static_parameters<M>(model: &M, states: &[M::State], tolerance: f64)
-where
-    M: StaticParameters<State: Debug>,
-{
-    assert!(!states.is_empty(), "no state was given: nothing would be checked");
-    let mut lengths: BTreeMap<M::Structure, usize> = BTreeMap::new();
-    for state in states {
-        let (structure, own) = (model.structure(state), model.parameters(state));
-        assert!(own.iter().all(|v| v.is_finite()), "a parameter is not finite: {own:?} of {state:?}");
-        let length = *lengths.entry(structure.clone()).or_insert(own.len());
-        assert_eq!(own.len(), length, "states of {structure:?} have different numbers of parameters: {state:?}");
-    }
-    for state in states {
-        let (structure, own) = (model.structure(state), model.parameters(state));
-        assert!(model.with_parameters(state, &own).is_some(), "its own parameters {own:?} make {state:?} impossible");
-        for given in states.iter().filter(|s| model.structure(s) == structure).map(|s| model.parameters(s)) {
-            let Some(changed) = model.with_parameters(state, &given) else { continue };
-            assert_eq!(model.structure(&changed), structure, "parameters {given:?} changed the structure of {state:?}");
-            let got = model.parameters(&changed);
-            let close = |(a, b): (&f64, &f64)| (a - b).abs() <= tolerance * (1.0 + b.abs());
-            assert!(
-                got.len() == given.len() && got.iter().zip(&given).all(close),
-                "a state with parameters {given:?} says that they are {got:?}: {changed:?}"
-            );
-        }
-    }
-}
-
-/// No step changes the structure or a parameter (by more than `tolerance`, relative to 1 + the value).
-///
-/// # Panics
-///
-/// When one does.
-pub fn check_parameters_stay<M>(model: &M, initial: &[M::State], steps: usize, tolerance: f64)
-where
-    M: StaticParameters<State: Debug>,
-{
-    for start in initial {
-        let (structure, before) = (model.structure(start), model.parameters(start));
-        for (_, state, _) in walk(model, std::slice::from_ref(start), steps) {
-            assert_eq!(model.structure(&state), structure, "a step changed the structure of {start:?}");
-            let after = model.parameters(&state);
-            let close = |(a, b): (&f64, &f64)| (a - b).abs() <= tolerance * (1.0 + b.abs());
-            assert!(
-                after.len() == before.len() && after.iter().zip(&before).all(close),
-                "a step changed the parameters {before:?} to {after:?}"
-            );
-        }
     }
 }
 

@@ -11,13 +11,15 @@ mod episode;
 mod model;
 mod policy;
 mod prior;
+mod replay;
 mod seed;
 
-pub use belief::{Belief, Proposals, StructureReport, UpdateReport, Updater};
+pub use belief::{Belief, Proposals, UpdateReport, Updater};
 pub use episode::{Transition, discounted_return};
-pub use model::{Discretise, GenerativeModel, ObservationModel, Outcome, Partition, Perturb, StaticParameters, Step};
+pub use model::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Step};
 pub use policy::{ActionPrior, Policy, UniformPolicy};
 pub use prior::{Density, Prior};
 /// Of the version that [`Rng`] belongs to.
 pub use rand;
+pub use replay::{Factor, Replay, Teacher};
 pub use seed::{Purpose, Rng, Seed};

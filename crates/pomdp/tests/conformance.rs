@@ -3,9 +3,7 @@
 use std::cell::Cell;
 
 use pomdp::conformance as check;
-use pomdp::{
-    Density, Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Prior, Rng, StaticParameters, Step,
-};
+use pomdp::{Density, Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Prior, Rng, Step};
 use rand::RngExt as _;
 
 /// What is wrong with the model.
@@ -24,20 +22,14 @@ enum Fault {
     NoiseImpossible,
     NoiseDoesNothing,
     NoiseOffCentre,
-    RefusesItsOwnParameters,
-    StructureChanges,
-    ParametersLost,
-    ParameterMissing,
-    StepMovesParameters,
 }
 use Fault::*;
 
-/// A lamp: on with an unknown probability, in one of two colours.
+/// A lamp: on with an unknown probability.
 struct Lamp(Fault, Cell<u32>);
 
 #[derive(Clone, Debug, PartialEq)]
 struct State {
-    red: bool,
     share: f64,
 }
 
@@ -46,7 +38,7 @@ fn lamp(fault: Fault) -> Lamp {
 }
 
 fn states() -> Vec<State> {
-    (0..10).map(|i| State { red: i % 2 == 0, share: 0.05 + 0.1 * f64::from(i) }).collect()
+    (0..10).map(|i| State { share: 0.05 + 0.1 * f64::from(i) }).collect()
 }
 
 impl GenerativeModel for Lamp {
@@ -60,9 +52,6 @@ impl GenerativeModel for Lamp {
 
     fn step(&self, state: &mut State, _action: &(), rng: &mut Rng) -> Step<bool> {
         self.1.set(self.1.get() + 1);
-        if self.0 == StepMovesParameters {
-            state.share *= 0.99;
-        }
         let on = rng.random_bool(state.share) ^ (self.0 == SharedState && self.1.get().is_multiple_of(2));
         let reward = if self.0 == InfiniteReward { f64::INFINITY } else { 0.0 };
         Step { observation: on, reward, outcome: Outcome::Continue }
@@ -107,31 +96,6 @@ impl Perturb for Lamp {
     }
 }
 
-impl StaticParameters for Lamp {
-    type Structure = bool;
-
-    fn structure(&self, state: &State) -> bool {
-        state.red
-    }
-
-    fn parameters(&self, state: &State) -> Vec<f64> {
-        if self.0 == ParameterMissing && state.share > 0.5 {
-            return vec![];
-        }
-        vec![(state.share / (1.0 - state.share)).ln()]
-    }
-
-    fn with_parameters(&self, state: &State, parameters: &[f64]) -> Option<State> {
-        let share = 1.0 / (1.0 + (-parameters[0]).exp());
-        match self.0 {
-            RefusesItsOwnParameters => None,
-            ParametersLost => Some(state.clone()),
-            StructureChanges => Some(State { red: !state.red, share }),
-            _ => Some(State { share, ..state.clone() }),
-        }
-    }
-}
-
 fn possible(state: &State) -> bool {
     (0.0..=1.0).contains(&state.share)
 }
@@ -144,8 +108,6 @@ fn check_model(fault: Fault) {
     check::check_discretise(&model, &states(), 20);
     check::check_perturb(&model, &states(), 50, possible);
     check::check_perturb_is_centred(&model, &states()[5], 4000, |s| vec![s.share]);
-    check::check_static_parameters(&model, &states(), 1e-12);
-    check::check_parameters_stay(&model, &states(), 10, 1e-12);
 }
 
 fn message(run: impl FnOnce() + std::panic::UnwindSafe) -> String {
@@ -173,16 +135,10 @@ fn every_broken_promise_is_found_and_named() {
         (NoiseImpossible, "impossible"),
         (NoiseDoesNothing, "changed nothing"),
         (NoiseOffCentre, "on average"),
-        (RefusesItsOwnParameters, "its own parameters"),
-        (StructureChanges, "changed the structure"),
-        (ParametersLost, "says that they are"),
-        (ParameterMissing, "different numbers of parameters"),
     ] {
         let message = message(move || check_model(fault));
         assert!(message.contains(expected), "{message} does not say {expected}");
     }
-    let moving = message(|| check::check_parameters_stay(&lamp(StepMovesParameters), &states(), 10, 1e-12));
-    assert!(moving.contains("a step changed the parameters"), "{moving}");
     let nothing = message(|| check::check_observation_model(&lamp(Nothing), &[], 10));
     assert!(nothing.contains("nothing would be checked"), "{nothing}");
 }

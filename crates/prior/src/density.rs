@@ -1,9 +1,9 @@
-//! The density of suggestions in the coordinates of a belief filter: what importance weights need.
+//! The density of suggestions in plain coordinates: what importance weights need.
 
+use physics_model::ObjectShape;
 use physics_model::config::ObstacleMobility;
 use physics_model::state::BODY_LEN;
 use physics_model::theta::THETA_LEN;
-use physics_model::{ObjectShape, Theta};
 use push_task::Particle;
 use push_task::state::State;
 
@@ -45,25 +45,26 @@ pub fn raw_particle(layout: &Layout, draw: &Draw, observation: &[f64], joints: u
     Particle::new(state, theta)
 }
 
-/// ln q of a particle's static parameters under `mixture`, with all else integrated out. q is the probability of its
-/// shapes times the density of its parameters, in the coordinates of `PushModel`'s [`pomdp::StaticParameters`].
-///
-/// The mixture is one over written targets y; with coordinates x the density is that of y(x) times |dy/dx|. Sizes come first in the
-/// order of elimination, then the centre of mass, whose bounds depend on them: the Jacobian is triangular.
+/// ln q of what a network can say of the start of an episode, in plain coordinates: shapes, ln masses, friction, sizes, and the place of an obstacle
+/// that cannot move. The rest is integrated out, as in [`push_task::Coordinates::log_density`].
 #[must_use]
-pub fn log_density(mixture: &Mixture, joints: usize, mobility: ObstacleMobility, particle: &Particle) -> f64 {
-    let (targets, applies) = features::theta_row(&particle.theta);
+pub fn log_density_of_start(mixture: &Mixture, joints: usize, mobility: ObstacleMobility, start: &Particle) -> f64 {
+    let (targets, applies) = features::theta_row(&start.theta);
     let width = joints + 2 * BODY_LEN + THETA_LEN;
     let (mut values, mut mask) = (vec![0.0; width], vec![false; width]);
     let first = joints + 2 * BODY_LEN;
-    let mut log_jacobian = log_jacobian(&particle.theta);
     for (index, (target, applies)) in targets.iter().zip(applies).enumerate() {
         let mass = index == 0 || index == 8;
         values[first + index] = if mass { target.ln() } else { *target };
-        // A fixed obstacle's mass is no coordinate of the filter's.
-        mask[first + index] = applies && !(index == 8 && mobility == ObstacleMobility::Fixed);
+        // The centre of mass, and the mass of what cannot move.
+        let left_out = (1..4).contains(&index) || (index == 8 && mobility == ObstacleMobility::Fixed);
+        mask[first + index] = applies && !left_out;
     }
-    if let (Some(body), ObstacleMobility::Fixed) = (&particle.state.obstacle, mobility) {
+    // Widths are written twice the radius.
+    let radii = [Some(start.theta.object.shape), start.theta.obstacle.as_ref().map(|o| o.shape)];
+    let round = radii.into_iter().flatten().filter(|shape| *shape != ObjectShape::Box).count();
+    let mut log_jacobian = round as f64 * std::f64::consts::LN_2;
+    if let (Some(body), ObstacleMobility::Fixed) = (&start.state.obstacle, mobility) {
         let half_yaw = 0.5 * body.yaw_rad();
         for (place, value) in PLANE.into_iter().zip([body.position_m[0], body.position_m[1], half_yaw.sin()]) {
             values[joints + BODY_LEN + place] = value;
@@ -71,27 +72,5 @@ pub fn log_density(mixture: &Mixture, joints: usize, mobility: ObstacleMobility,
         }
         log_jacobian += (0.5 * half_yaw.cos().abs()).ln();
     }
-    mixture.log_density_masked(&values, &mask, &particle.theta.classes()) + log_jacobian
-}
-
-/// Σ ln |dy/dx| over friction, sizes and centre of mass; that of a mass is 0.
-fn log_jacobian(theta: &Theta) -> f64 {
-    let object = &theta.object;
-    // y = 1 / (1 + exp(−x)): dy/dx = y (1 − y).
-    let logistic = |share: f64| (share * (1.0 - share)).ln();
-    // Written as widths: d(2r)/d(ln r) = 2r.
-    let sizes = |shape: ObjectShape, size_m: [f64; 3]| -> f64 {
-        let (extents, applies) = features::extents(shape, size_m);
-        extents.iter().zip(applies).filter(|(_, applies)| *applies).map(|(extent, _)| extent.ln()).sum()
-    };
-    let com = match object.shape {
-        ObjectShape::Sphere => logistic(-object.com_m[2] / object.size_m[0]) + object.size_m[0].ln(),
-        shape => {
-            let half = shape.half_extents_m(object.size_m);
-            let each = object.com_m.iter().zip(half);
-            each.map(|(com, half)| logistic(0.5 * (1.0 + com / half)) + (2.0 * half).ln()).sum()
-        }
-    };
-    let obstacle = theta.obstacle.as_ref().map_or(0.0, |o| sizes(o.shape, o.size_m));
-    logistic(object.friction) + sizes(object.shape, object.size_m) + com + obstacle
+    mixture.log_density_masked(&values, &mask, &start.theta.classes()) + log_jacobian
 }

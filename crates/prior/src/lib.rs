@@ -21,13 +21,13 @@
 //!   episodes that touched it, and denies it in 64.6 % of those without one. An LSTM trained only for this reached 82
 //!   to 90 % and 75 to 55 %. The Jaco does better, as its hand holds the object.
 //! - **The action** is an optional input (`train --action-input`), off as published. With it the Sawyer prior gains 0.2
-//!   nats per step. The shipped priors do without, because both presets share them.
+//!   nats per step. The networks of preset `paper` do without, those of the bridge filter have it.
 //! - **Dropout** 0.1 on the output of each layer, by held-out likelihood at epoch 100: −117.85, −118.29, −118.20 nats a step for 0, 0.1, 0.2.
 //!   A cosine schedule instead of a constant rate.
 //! - **One factor per target** scales the stated spread, fitted on the held-out part ([`TrainConfig::rescale`]): a
 //!   network that fits its training data well is overconfident. Calibration is measured on other data, from another
 //!   seed.
-//! - **Suggestions as proposals** ([`density`]): their density in the coordinates of the belief filter.
+//! - **Suggestions as proposals** ([`density`]): their density in plain coordinates, for importance weights.
 //!
 //! # Example
 //!
@@ -110,14 +110,17 @@ pub use suggest::Suggester;
 #[cfg(feature = "training")]
 pub use train::{Trainer, curve_csv, is_held_out};
 
-/// The default prior of a program for `robot`: the one trained here (with `quick` a quickly trained one first), else
-/// the shipped one.
+/// The default network of a program, whose folder has one of `names`, the first that there is: trained here (with `quick` a quickly trained one
+/// first), else shipped.
 #[must_use]
-pub fn default_folder(root: &std::path::Path, robot: &str, quick: bool) -> std::path::PathBuf {
-    let at = |folder: &str| root.join(folder).join(robot);
-    let quick = quick.then(|| at("runs/quick/priors"));
-    let candidates = quick.into_iter().chain([at("runs/priors")]);
-    candidates.into_iter().find(|folder| folder.join(checkpoint::FILE).is_file()).unwrap_or_else(|| at("assets/priors"))
+pub fn default_folder(root: &std::path::Path, names: &[impl AsRef<str>], quick: bool) -> std::path::PathBuf {
+    let quick = quick.then_some("runs/quick/priors");
+    let places = quick.into_iter().chain(["runs/priors", "assets/priors"]);
+    let mut folders = places.flat_map(|place| names.iter().map(move |name| root.join(place).join(name.as_ref())));
+    let last = names.last().map_or("", AsRef::as_ref);
+    folders
+        .find(|folder| folder.join(checkpoint::FILE).is_file())
+        .unwrap_or_else(|| root.join("assets/priors").join(last))
 }
 
 /// The project folder that a command line names, or the nearest one at or above `start`, else `start`. The programs of this crate need no

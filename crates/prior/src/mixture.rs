@@ -193,11 +193,25 @@ impl Mixture {
     #[must_use]
     pub fn sample(&self, rng: &mut Rng) -> Draw {
         let component = pick(self.weights.iter().copied(), rng);
-        let gaussians = self.means(component).iter().zip(self.stddevs(component));
-        let values = gaussians.map(|(mean, stddev)| mean + stddev * rng.sample::<f64, _>(StandardNormal)).collect();
+        let values = self.values(component, rng);
         let targets = 0..self.sizes.len();
         let classes = targets.map(|target| pick(self.log_classes(component, target).iter().map(|log| log.exp()), rng));
         Draw { values, classes: classes.collect(), component }
+    }
+
+    /// One draw, given the label of each class target, which must be possible.
+    #[must_use]
+    pub fn sample_given(&self, classes: &[usize], rng: &mut Rng) -> Draw {
+        let joint: Vec<f64> = self.joint(classes).collect();
+        let total = log_sum_exp(joint.iter().copied());
+        let component = pick(joint.iter().map(|log| (log - total).exp()), rng);
+        Draw { values: self.values(component, rng), classes: classes.to_vec(), component }
+    }
+
+    /// Continuous values drawn from a component.
+    fn values(&self, component: usize, rng: &mut Rng) -> Vec<f64> {
+        let gaussians = self.means(component).iter().zip(self.stddevs(component));
+        gaussians.map(|(mean, stddev)| mean + stddev * rng.sample::<f64, _>(StandardNormal)).collect()
     }
 
     /// Means and most likely classes of the component with the largest weight.

@@ -1,10 +1,7 @@
 //! Standard problems of planning and filtering under partial observability, with known answers.
 //!
-//! Tests and benchmarks of `planner` and `belief` run on these. States are small `Copy` values, a step takes some ten nanoseconds, and
+//! Tests and benchmarks of `planner` run on these. States are small `Copy` values, a step takes some ten nanoseconds, and
 //! every transition and observation function is tested against its published definition.
-//!
-//! For filters there are [`hmm`] (posterior and evidence by Bayes' rule), [`linear_gaussian`] (Kalman) and [`static_parameter`] (conjugate
-//! posteriors of two structures).
 //!
 //! # Example
 //!
@@ -22,12 +19,9 @@ pub mod beams;
 pub mod bits;
 pub mod episode;
 pub mod finite;
-pub mod hmm;
 pub mod laser_tag;
 pub mod light_dark;
-pub mod linear_gaussian;
 pub mod rock_sample;
-pub mod static_parameter;
 pub mod sub_hunt;
 pub mod tag;
 pub mod tiger;

@@ -147,18 +147,21 @@ pub struct PerturbConfig {
     pub size_m: f64,
 }
 
-/// What the model takes to be its own error in one action: standard deviations of Gaussians that a filter on continuous observations adds to the
-/// simulated end of the action, whose pose it then corrects by the measured one. 0 is an exact model.
+/// Noise of the transition s' ~ f(s, a | Θ): standard deviations of Gaussians, in the true world and in the model alike. 0 is a world without noise.
+///
+/// The pose is disturbed in an action in which the tool touched something or the object moved; an object at rest stays where it is. Pushes of
+/// one object on one table scatter by about a tenth of the motion (Yu, Bauza, Fazeli and Rodriguez, "More than a million ways to be pushed", IROS
+/// 2016).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ModelErrorConfig {
+pub struct TransitionNoise {
     /// x and y of the object, m.
     pub position_m: f64,
     /// Yaw of the object, rad.
     pub yaw_rad: f64,
-    /// Wrist force and torque, each component, as a share of the simulated magnitude.
+    /// Mean wrist force and torque of an action, each component, as a share of their magnitude.
     pub force_share: f64,
-    /// Each joint torque, N·m.
+    /// Mean of each joint torque of an action in which the tool touched something, N·m.
     pub joint_torque_nm: f64,
 }
 
@@ -176,8 +179,8 @@ pub struct PushConfig {
     pub sensor: SensorConfig,
     /// Noise of reinvigoration.
     pub perturb: PerturbConfig,
-    /// What the model takes to be its own error.
-    pub model_error: ModelErrorConfig,
+    /// Noise of the transition.
+    pub transition_noise: TransitionNoise,
     /// Effects beyond rigid bodies with Coulomb friction.
     pub effects: Vec<EffectConfig>,
 }

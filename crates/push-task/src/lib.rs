@@ -20,25 +20,29 @@
 
 pub mod action;
 pub mod config;
+pub mod coordinates;
 mod drive;
 mod force;
 pub mod goal;
 pub mod heuristic;
+mod history;
 pub mod model;
-mod model_error;
-pub mod parameters;
 mod perturb;
 pub mod reward;
 pub mod sampling;
 pub mod sensor;
 mod simulation;
 pub mod state;
+mod transition_noise;
 
 pub use action::Action;
 pub use config::PushConfig;
+pub use coordinates::Coordinates;
 pub use goal::GoalPolicy;
 pub use heuristic::HeuristicPolicy;
-pub use model::{ActionReport, Particle, PushModel};
+pub use history::History;
+pub use model::{ActionReport, Answer, Particle, PushModel};
 pub use sampling::WorldDistribution;
 pub use sensor::{Observation, ObservationKey};
 pub use state::State;
+pub use transition_noise::STEP_COORDINATES;

@@ -9,7 +9,7 @@ use physics_model::error::Impossible;
 use physics_model::feasible::{check_overlaps, check_theta};
 use physics_model::motion::JointPath;
 use physics_model::robot::Robot;
-use physics_model::state::BodyState;
+use physics_model::state::{BodyState, unit_quaternion};
 use physics_model::theta::Theta;
 use physics_model::world::{Divergence, ToolPose};
 use pomdp::{Discretise, GenerativeModel, ObservationModel, Outcome, Perturb, Rng, Step};
@@ -18,13 +18,17 @@ use serde::{Deserialize, Serialize};
 use crate::action::Action;
 use crate::config::{ForceSensing, PushConfig};
 use crate::force::{ForceSensor, resting_reading};
-use crate::model_error;
 use crate::perturb;
 use crate::reward::Events;
 use crate::sensor::{Observation, ObservationKey, Readings};
 use crate::simulation::{Course, Simulation};
 use crate::state::State;
+use crate::transition_noise::SETTLING;
 
+/// Standard deviations of where the tool comes to rest, m: at the end of its way, and where something stops it, which may be a control step earlier
+/// or later (2 mm at full speed).
+const TOOL_M: f64 = 0.0005;
+const TOOL_STOP_M: f64 = 0.002;
 /// Attempts at moving a hypothesis to a possible one.
 const PERTURB_DRAWS: usize = 5;
 
@@ -53,6 +57,15 @@ impl Particle {
     }
 }
 
+/// What the arm answered to an action.
+#[derive(Clone, Copy, Debug)]
+pub struct Answer<'a> {
+    /// Sensor values.
+    pub observation: &'a Observation,
+    /// Joint positions after the action, rad.
+    pub joints_rad: &'a [f64],
+}
+
 /// What happened in an action, for records and statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ActionReport {
@@ -62,6 +75,8 @@ pub struct ActionReport {
     pub obstacle_touched: bool,
     /// The tool touched something.
     pub tool_touched: bool,
+    /// The tool touched something, or the object moved: the action has the noise of a push.
+    pub pushed: bool,
     /// The simulation ended in an impossible world; the particle is as it was before.
     pub divergence: Option<Divergence>,
 }
@@ -228,6 +243,69 @@ impl PushModel {
     /// [`GenerativeModel::step`].
     pub fn act(&self, particle: &mut Particle, action: Action, rng: &mut Rng) -> (Step<Observation>, ActionReport) {
         let task = &self.config.task;
+        let before = particle.state.object.position_m;
+        let mut report = self.advance(particle, action);
+        if report.divergence.is_some() {
+            // The state stays as it was, so that nothing downstream meets a value that is not finite.
+            let observation = self.config.sensor.observe(&self.readings(particle), rng);
+            let reward = task.reward.reward(report.events) + task.endless_cost();
+            return (Step { observation, reward, outcome: Outcome::Diverged }, report);
+        }
+        self.disturb(particle, report.pushed, rng);
+        self.settle(particle, before, &mut report);
+        let observation = self.config.sensor.observe(&self.readings(particle), rng);
+        let outcome = if report.events.goal { Outcome::Terminal } else { Outcome::Continue };
+        (Step { observation, reward: task.reward.reward(report.events), outcome }, report)
+    }
+
+    /// One action of a history, in place: f(s, a | Θ), then the noise that `answer` asks for. Returns ln p(observation | state before, action)
+    /// with the noise of the transition integrated out; −∞ where the action cannot have been that one. The state after it is a draw from what
+    /// the observation leaves of the noise, which `coordinates` decide: [`STEP_COORDINATES`](crate::STEP_COORDINATES) standard normal numbers.
+    ///
+    /// The arm reports where its joints are, so that particles take them over. Where a particle's own arm came to rest elsewhere, that counts
+    /// against it.
+    pub fn replay(&self, particle: &mut Particle, action: Action, answer: Answer<'_>, coordinates: &[f64]) -> f64 {
+        let before = particle.state.object.position_m;
+        let mut report = self.advance(particle, action);
+        if report.divergence.is_some() {
+            return f64::NEG_INFINITY;
+        }
+        let stop_m = if report.events.large_force { TOOL_STOP_M } else { 0.0 };
+        let (reached, measured) =
+            (self.tool_position_m(&particle.state.joints_rad), self.tool_position_m(answer.joints_rad));
+        let missed = (0..3).map(|i| (reached[i] - measured[i]).powi(2)).sum::<f64>().sqrt();
+        let stop = gaussian(missed, TOOL_M.hypot(stop_m));
+        particle.state.joints_rad.copy_from_slice(answer.joints_rad);
+
+        let noise = self.config.transition_noise.of(report.pushed);
+        let readings = self.readings(particle);
+        let (log_likelihood, object) =
+            noise.explain(&self.config.sensor, &readings, &particle.state.object, answer.observation, coordinates);
+        if !log_likelihood.is_finite() {
+            return f64::NEG_INFINITY;
+        }
+        let simulated = std::mem::replace(&mut particle.state.object, object);
+        if self.check(particle).is_err() {
+            // Measured into something else: the simulated pose stays, unless the arm went to where it is.
+            particle.state.object = simulated;
+            if self.check(particle).is_err() {
+                return f64::NEG_INFINITY;
+            }
+        }
+        self.settle(particle, before, &mut report);
+        // The episode goes on, so that the object is not at the goal.
+        if report.events.goal { f64::NEG_INFINITY } else { stop + log_likelihood }
+    }
+
+    /// Upper bound of what [`Self::replay`] can return.
+    #[must_use]
+    pub fn most_log_likelihood(&self) -> f64 {
+        self.config.sensor.most_log_likelihood(self.joint_count()) + gaussian(0.0, TOOL_M)
+    }
+
+    /// s' = f(s, a | Θ), in place: without noise and without what follows for rewards.
+    fn advance(&self, particle: &mut Particle, action: Action) -> ActionReport {
+        let task = &self.config.task;
         let tool = self.tool_pose(&particle.state.joints_rad);
         let start = tool.position_m;
         let direction = action.direction();
@@ -246,14 +324,13 @@ impl PushModel {
         let mut sensor = ForceSensor::new(&self.robot, &self.config.sensor, effects, period_secs, path);
         let simulation = Simulation::new(self, particle, effects, nominal.as_ref(), &course, path.as_ref());
         let end = simulation.run(&mut sensor, &mut report);
-
         if report.divergence.is_some() {
-            // The state stays as it was, so that nothing downstream meets a value that is not finite.
-            let observation = self.config.sensor.observe(&self.readings(particle), rng);
-            let reward = task.reward.reward(report.events) + task.endless_cost();
-            return (Step { observation, reward, outcome: Outcome::Diverged }, report);
+            return report;
         }
-        let before = particle.state.object.position_m;
+        let (from, to) = (&particle.state.object, &end.object);
+        let moved_m = (0..3).map(|i| (to.position_m[i] - from.position_m[i]).powi(2)).sum::<f64>().sqrt();
+        let turned_rad = unit_quaternion(to.orientation).angle_to(&unit_quaternion(from.orientation));
+        report.pushed = report.tool_touched || moved_m > SETTLING || turned_rad > SETTLING;
         particle.state.object = end.object;
         particle.state.obstacle = end.obstacle;
         if let Some(joints) = end.joints_rad {
@@ -278,14 +355,33 @@ impl PushModel {
                 memory.note_lag(&seen, &particle.state.object);
             }
         }
+        report
+    }
+
+    /// Adds the noise of the transition; no random number where there is none.
+    fn disturb(&self, particle: &mut Particle, pushed: bool, rng: &mut Rng) {
+        if self.config.transition_noise.is_none() {
+            return;
+        }
+        let noise = self.config.transition_noise.of(pushed);
+        let wrist = self.config.sensor.force == ForceSensing::Wrist;
+        let (object, force) = noise.draw(&particle.state.object, &particle.force, wrist, rng);
+        particle.force = force;
+        let simulated = std::mem::replace(&mut particle.state.object, object);
+        if self.check(particle).is_err() {
+            // Disturbed into something else.
+            particle.state.object = simulated;
+        }
+    }
+
+    /// What the end of an action means for rewards; `before` is where the object was, m.
+    fn settle(&self, particle: &mut Particle, before: [f64; 3], report: &mut ActionReport) {
+        let task = &self.config.task;
         let after = particle.state.object.position_m;
         let moved = (0..3).map(|i| (after[i] - before[i]).powi(2)).sum::<f64>().sqrt();
         report.events.first_moved = !particle.object_moved && moved > task.reward.moved_threshold_m;
         particle.object_moved |= report.events.first_moved;
         report.events.goal = task.goal.contains(after);
-        let observation = self.config.sensor.observe(&self.readings(particle), rng);
-        let outcome = if report.events.goal { Outcome::Terminal } else { Outcome::Continue };
-        (Step { observation, reward: task.reward.reward(report.events), outcome }, report)
     }
 
     pub(crate) fn tool_pose(&self, joints_rad: &[f64]) -> ToolPose {
@@ -343,17 +439,7 @@ impl GenerativeModel for PushModel {
 
 impl ObservationModel for PushModel {
     fn log_likelihood(&self, _action: &Action, next: &Particle, observation: &Observation) -> f64 {
-        self.config.sensor.log_likelihood(observation, &self.readings(next), &self.config.model_error)
-    }
-
-    fn correct(&self, next: &mut Particle, observation: &Observation, rng: &mut Rng) {
-        let object =
-            model_error::corrected(&self.config.model_error, &self.config.sensor.noise, next, observation, rng);
-        let moved = Particle { state: State { object, ..next.state.clone() }, ..next.clone() };
-        // Measured into something else: the simulated pose stays.
-        if self.check(&moved).is_ok() {
-            *next = moved;
-        }
+        self.config.sensor.log_likelihood(observation, &self.readings(next), &self.config.transition_noise)
     }
 }
 
@@ -377,4 +463,9 @@ impl Perturb for PushModel {
             }
         }
     }
+}
+
+/// ln of the density of N(0, stddev²) at `value`.
+fn gaussian(value: f64, stddev: f64) -> f64 {
+    -0.5 * (value / stddev).powi(2) - stddev.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln()
 }

@@ -16,8 +16,8 @@ use crate::state::State;
 pub mod effects;
 
 /// Drawn masses are kept in these ranges, kg: a Gamma distribution has no largest value, and the solver no use for a gram.
-const OBJECT_MASS_KG: [f64; 2] = [0.02, 20.0];
-const OBSTACLE_MASS_KG: [f64; 2] = [0.02, 200.0];
+pub(crate) const OBJECT_MASS_KG: [f64; 2] = [0.02, 20.0];
+pub(crate) const OBSTACLE_MASS_KG: [f64; 2] = [0.02, 200.0];
 /// Draws of one world that may fail the checks before the distribution is called impossible.
 const MOST_DRAWS: usize = 1000;
 
@@ -40,7 +40,12 @@ impl TruncatedNormal {
     /// One draw, by inversion of the distribution function: one random number a draw.
     #[must_use]
     pub fn sample(&self, rng: &mut Rng) -> f64 {
-        let u: f64 = rng.random();
+        self.quantile(rng.random())
+    }
+
+    /// The value below which a draw lies with probability `u` in [0, 1].
+    #[must_use]
+    pub fn quantile(&self, u: f64) -> f64 {
         let Ok(normal) = Normal::new(self.mean, self.stddev) else {
             return self.mean.clamp(self.low, self.high);
         };
@@ -117,16 +122,20 @@ pub struct SizeDistribution {
 
 impl SizeDistribution {
     fn sample(&self, shape: ObjectShape, rng: &mut Rng) -> [f64; 3] {
-        let parts: &[TruncatedNormal] = match shape {
-            ObjectShape::Box => &self.r#box,
-            ObjectShape::Cylinder => &self.cylinder,
-            ObjectShape::Sphere => &self.sphere,
-        };
         let mut size = [0.0; 3];
-        for (slot, part) in size.iter_mut().zip(parts) {
+        for (slot, part) in size.iter_mut().zip(self.parts_of(shape)) {
             *slot = part.sample(rng);
         }
         size
+    }
+
+    /// Those of one shape.
+    pub(crate) fn parts_of(&self, shape: ObjectShape) -> &[TruncatedNormal] {
+        match shape {
+            ObjectShape::Box => &self.r#box,
+            ObjectShape::Cylinder => &self.cylinder,
+            ObjectShape::Sphere => &self.sphere,
+        }
     }
 
     fn parts(&self) -> impl Iterator<Item = &TruncatedNormal> {
@@ -286,7 +295,7 @@ impl WorldDistribution {
 
 /// A start is possible if no two bodies overlap at all. Soft contacts allow some overlap later, so each body is grown by that
 /// allowance first.
-fn separate(model: &PushModel, particle: &Particle) -> bool {
+pub(crate) fn separate(model: &PushModel, particle: &Particle) -> bool {
     let mut grown = particle.clone();
     let margin = 2.0 * physics_model::feasible::OVERLAP_LIMIT_M;
     let grow = |shape: ObjectShape, size_m: &mut [f64; 3]| match shape {

@@ -6,7 +6,7 @@ use pomdp::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ForceSensing, ModelErrorConfig, SensorConfig};
+use crate::config::{ForceSensing, SensorConfig, TransitionNoise};
 
 /// Largest index of a discretised value: 8 bits.
 const BINS: f64 = 255.0;
@@ -149,9 +149,24 @@ impl SensorConfig {
         ObservationKey(key)
     }
 
-    /// ln p(observation | readings): Gaussian noise on every value, and on some the model's own error.
+    /// Upper bound of [`Self::log_likelihood`] for an arm of `joints` joints.
     #[must_use]
-    pub fn log_likelihood(&self, observation: &Observation, readings: &Readings, error: &ModelErrorConfig) -> f64 {
+    pub fn most_log_likelihood(&self, joints: usize) -> f64 {
+        let noise = &self.noise;
+        let joints = joints as f64;
+        let pose = 3.0 * noise.position_m.ln() + 3.0 * noise.orientation_rad.ln();
+        let (count, force) = match self.force {
+            ForceSensing::Wrist => {
+                (joints + 6.0, joints * noise.joint_rad.ln() + 3.0 * noise.force_n.ln() + 3.0 * noise.torque_nm.ln())
+            }
+            ForceSensing::JointTorques => (joints, joints * noise.joint_torque_nm.ln()),
+        };
+        -pose - force - 0.5 * (count + 6.0) * (2.0 * std::f64::consts::PI).ln()
+    }
+
+    /// ln p(observation | readings): Gaussian noise on every value, and on some that of the transition.
+    #[must_use]
+    pub fn log_likelihood(&self, observation: &Observation, readings: &Readings, error: &TransitionNoise) -> f64 {
         let noise = &self.noise;
         let values = &observation.0;
         let joints = readings.joints_rad.len();
@@ -301,7 +316,7 @@ pub(crate) mod tests {
         // E[ln p] of a Gaussian of dimension d with the 20 → 19 free values: −d/2 (1 + ln 2π) − Σ ln σ.
         let n = 2000;
         let mean = (0..n)
-            .map(|_| sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &truth, &ModelErrorConfig::default()))
+            .map(|_| sensor.log_likelihood(&sensor.observe(&truth, &mut rng), &truth, &TransitionNoise::default()))
             .sum::<f64>()
             / f64::from(n);
         let log_stddevs = 7.0 * 0.001_f64.ln()
@@ -318,7 +333,7 @@ pub(crate) mod tests {
     fn likelihood_with_an_error_of_the_model_is_the_density_of_error_and_noise() {
         let sensor = sensor(ForceSensing::Wrist);
         let simulated = readings(7);
-        let error = ModelErrorConfig { position_m: 0.003, yaw_rad: 0.02, force_share: 0.3, joint_torque_nm: 1.0 };
+        let error = TransitionNoise { position_m: 0.003, yaw_rad: 0.02, force_share: 0.3, joint_torque_nm: 1.0 };
         let mut rng = Seed(3).stream(Purpose::Test, 0);
         let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
         let shares = [0.3 * size(&simulated.force[..3]), 0.3 * size(&simulated.force[3..])];

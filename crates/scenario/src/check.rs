@@ -108,7 +108,7 @@ impl Scenario {
 
     /// What particles are shaken by, and what the model is off by.
     fn error_problem(&self) -> Option<String> {
-        let (p, m) = (&self.perturb, &self.model_error);
+        let (p, m) = (&self.perturb, &self.transition_noise);
         let stddevs = [
             ("perturb.position_m", p.position_m),
             ("perturb.yaw_rad", p.yaw_rad),
@@ -118,10 +118,10 @@ impl Scenario {
             ("perturb.com_m", p.com_m),
             ("perturb.friction", p.friction),
             ("perturb.size_m", p.size_m),
-            ("model_error.position_m", m.position_m),
-            ("model_error.yaw_rad", m.yaw_rad),
-            ("model_error.force_share", m.force_share),
-            ("model_error.joint_torque_nm", m.joint_torque_nm),
+            ("transition_noise.position_m", m.position_m),
+            ("transition_noise.yaw_rad", m.yaw_rad),
+            ("transition_noise.force_share", m.force_share),
+            ("transition_noise.joint_torque_nm", m.joint_torque_nm),
         ];
         let at_least_0 = |v: f64| v.is_finite() && v >= 0.0;
         stddevs.iter().find_map(|(key, v)| check(at_least_0(*v), key, "a standard deviation, at least 0", v))
@@ -139,11 +139,10 @@ impl Scenario {
 
     /// What runs are told.
     fn run_problem(&self) -> Option<String> {
-        let (births, d, trials) = (&self.agent.birth_share, &self.data, &self.evaluation.trials);
+        let (d, trials) = (&self.data, &self.evaluation.trials);
         let actions = (1..=10_000).contains(&d.episode_actions);
         first([
-            (share(*births), "agent.birth_share", "0 to 1", births as &dyn Debug),
-            (share(d.movable_share), "data.movable_share", "0 to 1", &d.movable_share),
+            (share(d.movable_share), "data.movable_share", "0 to 1", &d.movable_share as &dyn Debug),
             (share(d.goal_share), "data.goal_share", "0 to 1", &d.goal_share),
             (share(d.exploration_share), "data.exploration_share", "0 to 1", &d.exploration_share),
             (actions, "data.episode_actions", "1 to 10000", &d.episode_actions),

@@ -139,26 +139,15 @@ fn holds(table: &Table, parts: &[&str]) -> bool {
 /// What is wrong with the values of a scenario, if anything: key and expectation.
 fn problem(scenario: &Scenario) -> Option<String> {
     scenario
-            .problem()
+        .problem()
         .or_else(|| scenario.planner.validate().err().map(|e| e.to_string()))
         .or_else(|| scenario.belief.rejection.validate().err().map(|e| e.to_string()))
-        .or_else(|| scenario.belief.weighted.validate().err().map(|e| e.to_string()))
+        .or_else(|| scenario.belief.bridge.validate().err().map(|e| e.to_string()))
         .or_else(|| {
-                // Else a restart late in an episode would be left out without a word.
-                let w = &scenario.belief.weighted;
-                let needed = w.history_limit * w.particles_min;
-                let short = w.restart_transitions > 0 && w.restart_transitions < needed;
-                short.then(|| {
-                    let found = w.restart_transitions;
-                    format!("belief.weighted.restart_transitions: expected 0 or history_limit × particles_min = {needed}, found {found}")
-                })
-            })
-        .or_else(|| {
-                let classes = scenario.planner.observations == planner::Observations::Classes;
-                (!classes).then(|| {
-                    "planner.observations: expected \"classes\", which is all that the agent searches with".into()
-                })
-            })
+            let classes = scenario.planner.observations == planner::Observations::Classes;
+            (!classes)
+                .then(|| "planner.observations: expected \"classes\", which is all that the agent searches with".into())
+        })
 }
 
 /// Tables merge key by key, except one-variant enums (`budget = { transitions = … }`), which replace as a whole; everything else
@@ -232,6 +221,6 @@ mod tests {
         let message = |set: &str| load(&[set]).unwrap_err().to_string();
         assert!(message("task.horizn=3").contains("nearest is `horizon`"), "{}", message("task.horizn=3"));
         assert!(message("horizon=3").contains("there is `task.horizon`"), "{}", message("horizon=3"));
-        assert!(message("belief.filter=\"weigted\"").contains("nearest is `weighted`"));
+        assert!(message("belief.filter=\"brigde\"").contains("nearest is `bridge`"));
     }
 }

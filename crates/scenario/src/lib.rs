@@ -21,7 +21,6 @@ mod load;
 mod provenance;
 mod schema;
 mod suggest;
-mod tracker;
 mod truth;
 
 pub use assemble::Problem;
@@ -35,4 +34,3 @@ pub use schema::{
     AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,
     InitialObstacle, Published, Rollouts, Scenario, VERSION,
 };
-pub use tracker::Tracker;

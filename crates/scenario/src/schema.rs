@@ -7,7 +7,7 @@ use physics_model::config::{ArmConfig, ObstacleMobility, WorldConfig};
 use physics_model::effect::EffectConfig;
 use physics_model::robot::RobotConfig;
 use push_task::WorldDistribution;
-use push_task::config::{ModelErrorConfig, PerturbConfig, PushConfig, SensorConfig, TaskConfig};
+use push_task::config::{PerturbConfig, PushConfig, SensorConfig, TaskConfig, TransitionNoise};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -40,8 +40,8 @@ pub struct Scenario {
     pub sensor: SensorConfig,
     /// Noise of reinvigoration.
     pub perturb: PerturbConfig,
-    /// What the model takes to be its own error.
-    pub model_error: ModelErrorConfig,
+    /// Noise of the transition, in the true world and in the model.
+    pub transition_noise: TransitionNoise,
     /// Worlds.
     pub distribution: WorldDistribution,
     /// What the robot believes at first.
@@ -84,8 +84,8 @@ pub struct EffectsConfig {
 pub enum Filter {
     /// As published: [`belief::RejectionFilter`].
     Rejection,
-    /// [`belief::WeightedFilter`].
-    Weighted,
+    /// From the network's estimate to the exact posterior: [`belief::BridgeFilter`].
+    Bridge,
 }
 
 /// Filters of the belief. All have settings; `filter` says which one runs.
@@ -96,8 +96,8 @@ pub struct BeliefConfig {
     pub filter: Filter,
     /// Rejection filter.
     pub rejection: belief::RejectionConfig,
-    /// Weighted filter.
-    pub weighted: belief::WeightedConfig,
+    /// Bridge filter.
+    pub bridge: belief::BridgeConfig,
 }
 
 impl BeliefConfig {
@@ -106,16 +106,24 @@ impl BeliefConfig {
     pub fn particles(&self) -> usize {
         match self.filter {
             Filter::Rejection => self.rejection.particles,
-            Filter::Weighted => self.weighted.particles_max,
+            Filter::Bridge => self.bridge.draws * self.bridge.kept,
         }
     }
+}
 
-    /// Most transitions that an update simulates, a restart included.
+impl Scenario {
+    /// Names of the folders that hold a network for this scenario, the best one first. The bridge filter's are trained on worlds with the transition's
+    /// noise and one mobility of the obstacle.
     #[must_use]
-    pub fn transitions(&self) -> usize {
-        match self.filter {
-            Filter::Rejection => self.rejection.max_attempts,
-            Filter::Weighted => self.weighted.max_transitions + self.weighted.restart_transitions,
+    pub fn prior_names(&self) -> Vec<String> {
+        let robot = &self.robot.name;
+        let mobility = match self.world.obstacle_mobility {
+            ObstacleMobility::Fixed => "fixed",
+            ObstacleMobility::Movable => "movable",
+        };
+        match self.belief.filter {
+            Filter::Rejection => vec![robot.clone()],
+            Filter::Bridge => vec![format!("{robot}-{mobility}"), robot.clone()],
         }
     }
 }
@@ -142,10 +150,8 @@ pub struct InitialBeliefConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AgentConfig {
-    /// Draws from the learned prior after each action.
+    /// Draws from the network after each action, for the rejection filter.
     pub proposals: usize,
-    /// Share of the belief that is drawn anew from the prior before each update; 0 as published.
-    pub birth_share: f64,
     /// Default policy of the search's simulations.
     pub rollouts: Rollouts,
 }
@@ -173,6 +179,10 @@ pub struct DataConfig {
     pub goal_share: f64,
     /// Share of uniformly random actions in every episode.
     pub exploration_share: f64,
+    /// Whether policies act in a world that they imagine, drawn from the distribution, with the object where it is seen. Otherwise they know the
+    /// true world, and their actions tell a network what no sensor could (Ortega et al., "Shaking the foundations: delusions in sequence models",
+    /// 2021).
+    pub imagined_worlds: bool,
 }
 
 /// A published success rate.
@@ -206,7 +216,7 @@ impl Scenario {
             task: self.task.clone(),
             sensor: self.sensor.clone(),
             perturb: self.perturb.clone(),
-            model_error: self.model_error,
+            transition_noise: self.transition_noise,
             effects: effects.to_vec(),
         }
     }

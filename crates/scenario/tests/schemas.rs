@@ -44,9 +44,11 @@ fn all_scenario_files_are_valid() {
     let layers =
         [scenarios.clone(), scenarios.join("presets")].iter().flat_map(|folder| toml_files(folder)).collect::<Vec<_>>();
     assert!(layers.len() > 8, "{layers:?}");
-    // Resolved scenarios of runs are layers too.
+    // Resolved scenarios of runs are layers too; those of versions that had a filter of their own stay as they were.
     let results = std::fs::read_dir(root().join("assets/results")).unwrap().map(|entry| entry.unwrap().path());
-    let resolved = results.map(|folder| folder.join("scenario.toml")).filter(|file| file.is_file());
+    let resolved = results
+        .map(|folder| folder.join("scenario.toml"))
+        .filter(|file| std::fs::read_to_string(file).is_ok_and(|text| !text.contains("[belief.weighted]")));
     for file in layers.into_iter().chain(resolved) {
         assert_eq!(problem(&scenario, &scenario, &read(&file), ""), None, "{}", file.display());
     }

@@ -7,13 +7,16 @@ use serde_json::Value;
 use super::probe::ask;
 use super::{Check, State};
 
+/// Folders below `assets/priors`: of the rejection filter, and of the bridge filter.
+const SHIPPED: [&str; 4] = ["sawyer", "jaco", "sawyer-fixed", "sawyer-movable"];
+
 pub(crate) fn checks(root: &Path) -> Vec<Check> {
-    let of = |robot: &str| {
-        let remedy = format!("git checkout -- assets/priors/{robot}; git lfs pull where it is a pointer");
-        let found = prior(root, &format!("assets/priors/{robot}"));
-        Check::new(&format!("prior of {robot}"), found, "eval with the network's suggestions", remedy).required()
+    let of = |name: &str| {
+        let remedy = format!("git checkout -- assets/priors/{name}; git lfs pull where it is a pointer");
+        let found = prior(root, &format!("assets/priors/{name}"));
+        Check::new(&format!("prior of {name}"), found, "eval with the network's suggestions", remedy).required()
     };
-    ["sawyer", "jaco"].map(of).into()
+    SHIPPED.map(of).into()
 }
 
 fn prior(root: &Path, folder: &str) -> Result<String, (State, String)> {

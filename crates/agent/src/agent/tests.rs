@@ -3,12 +3,12 @@ use std::path::Path;
 use belief::Particles;
 use physics_model::ObjectShape;
 use pomdp::{Outcome, Prior as _, Proposals, Purpose, Updater as _};
-use push_task::{Action, Particle};
+use push_task::Action;
 use scenario::{Selection, find_root};
 
 use super::*;
-use crate::controller::{obstacle_share, with_known_joints};
-use crate::proposals::{Context, suggest, with_births};
+use crate::controller::with_known_joints;
+use crate::proposals::{Context, suggest};
 use crate::{SimulatedWorld, WorldStep};
 
 fn problem(domain: &str, set: &[&str]) -> (Problem, Suggester) {
@@ -89,43 +89,6 @@ fn suggestions_join_the_belief_and_bring_an_unknown_obstacle_into_it() {
     let without = play(Method::NoRnn, None);
     assert!(without.steps.iter().filter_map(|s| s.update.as_ref()).all(|u| u.proposed == 0));
     assert!(without.steps.iter().filter_map(|s| s.obstacle_share).all(|share| share == 0.0));
-}
-
-#[test]
-fn births_bring_an_unknown_obstacle_into_a_weighted_belief() {
-    let (problem, mut prior) = problem("obstacle", &[]);
-    let mut world = world(&problem, Seed(5));
-    let (observation, _) = world.reset().unwrap();
-    prior.reset();
-    prior.suggest(None, &observation);
-    let mut rng = Seed(1).stream(Purpose::Test, 0);
-    let belief = Particles::uniform(problem.initial_particles(100, &observation, &mut rng).unwrap()).unwrap();
-    assert_eq!(obstacle_share(&belief), 0.0);
-    let renewed = with_births(&problem.model, &prior, belief.clone(), 0.2, &mut rng).unwrap();
-    let born = renewed.count() - 100;
-    assert!((10..=20).contains(&born), "{born} of 20 possible");
-    // Each of the 20 draws stands for a hundredth, whether the others were possible or not.
-    for (index, (particle, weight)) in renewed.iter().enumerate() {
-        let expected = if index < 100 { (1.0 - 0.01 * born as f64) / 100.0 } else { 0.01 };
-        assert!((weight - expected).abs() < 1e-12, "{index}: {weight} {expected}");
-        assert!(problem.model.check(particle).is_ok());
-        let near = |p: &Particle| p.state.object.position_m[..2] == particle.state.object.position_m[..2];
-        assert!(belief.iter().any(|(p, _)| near(p)), "{index} stands where no particle of the belief stood");
-    }
-    let share = obstacle_share(&renewed);
-    assert!(share > 0.02 && share < 0.2, "{share}");
-    // Through the whole loop.
-    let settings = ["belief.filter=weighted", "planner.budget={transitions=60}", "task.horizon=6"];
-    let shares = |birth: &str| {
-        let (problem, prior) = self::problem("obstacle", &[&settings[..], &[birth]].concat());
-        let mut agent = Agent::new(&problem, Method::Mixture, Some(&prior)).unwrap();
-        let episode = agent.run(&mut self::world(&problem, Seed(5)), Seed(5)).unwrap();
-        let shares: Vec<f64> = episode.steps.iter().filter_map(|s| s.obstacle_share).collect();
-        assert!(!shares.is_empty());
-        shares
-    };
-    assert!(shares("agent.birth_share=0.2").iter().any(|share| *share > 0.0));
-    assert!(shares("agent.birth_share=0.0").iter().all(|share| *share == 0.0));
 }
 
 #[test]

@@ -27,20 +27,19 @@ pub fn sample(distributions: &EffectDistributions, rng: &mut Rng) -> Vec<EffectV
         .collect()
 }
 
-/// ln of the density of [`sample`] at `values`; −∞ where these are not the parameters that it draws.
+/// Number of unknown parameters.
 #[must_use]
-pub fn log_density(distributions: &EffectDistributions, values: &[EffectValue]) -> f64 {
-    let mut total = 0.0;
-    let mut drawn = parameters(distributions);
-    for value in values {
-        match drawn.next() {
-            Some((parameter, distribution)) if parameter == value.parameter => {
-                total += distribution.log_density(value.value);
-            }
-            _ => return f64::NEG_INFINITY,
-        }
-    }
-    if drawn.next().is_some() { f64::NEG_INFINITY } else { total }
+pub fn count(distributions: &EffectDistributions) -> usize {
+    parameters(distributions).count()
+}
+
+/// Every parameter at a quantile in [0, 1], in the order of [`sample`].
+#[must_use]
+pub(crate) fn at(distributions: &EffectDistributions, quantiles: impl Iterator<Item = f64>) -> Vec<EffectValue> {
+    parameters(distributions)
+        .zip(quantiles)
+        .map(|((parameter, distribution), u)| EffectValue { parameter, value: distribution.quantile(u) })
+        .collect()
 }
 
 /// What is wrong with the distributions, if anything: key and expectation.
@@ -74,22 +73,6 @@ mod tests {
     fn tilt() -> EffectDistributions {
         let slope = TruncatedNormal { mean: 0.0, stddev: 0.02, low: -0.03, high: 0.05 };
         [(EffectKind::TableTilt, [("slope_y_rad".to_string(), slope)].into())].into()
-    }
-
-    #[test]
-    fn the_density_of_draws_integrates_to_one() {
-        let distributions = tilt();
-        let parameter = EffectParameter::new(EffectKind::TableTilt, "slope_y_rad").unwrap();
-        let n = 20_000;
-        let step = 0.08 / f64::from(n);
-        let total: f64 = (0..n)
-            .map(|i| EffectValue { parameter, value: -0.03 + step * (f64::from(i) + 0.5) })
-            .map(|value| log_density(&distributions, &[value]).exp() * step)
-            .sum();
-        assert!((total - 1.0).abs() < 1e-6, "{total}");
-        assert_eq!(log_density(&distributions, &[]), f64::NEG_INFINITY);
-        assert_eq!(log_density(&distributions, &[EffectValue { parameter, value: 0.06 }]), f64::NEG_INFINITY);
-        assert_eq!(log_density(&EffectDistributions::new(), &[]), 0.0);
     }
 
     #[test]

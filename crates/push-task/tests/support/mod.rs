@@ -6,8 +6,8 @@ use std::sync::Arc;
 use physics_model::config::{ArmConfig, ObstacleMobility, WorldConfig};
 use physics_model::robot::{Robot, RobotConfig};
 use push_task::config::{
-    ForceSensing, GoalConfig, ModelErrorConfig, NoiseConfig, PerturbConfig, ReachConfig, RewardConfig, SensorConfig,
-    TaskConfig,
+    ForceSensing, GoalConfig, NoiseConfig, PerturbConfig, ReachConfig, RewardConfig, SensorConfig, TaskConfig,
+    TransitionNoise,
 };
 use push_task::{PushConfig, PushModel};
 
@@ -79,7 +79,7 @@ pub(crate) fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f6
             friction: 0.05,
             size_m: 0.005,
         },
-        model_error: ModelErrorConfig::default(),
+        transition_noise: TransitionNoise::default(),
         effects: vec![],
     };
     let model = PushModel::new(push, robot);

@@ -89,10 +89,10 @@ fn run(arguments: &Arguments) -> Result<()> {
     let scenario = scenario;
     let problem = Problem::assemble(&scenario, &root)?;
     let method = arguments.method.unwrap_or(match scenario.belief.filter {
-        scenario::Filter::Weighted => Method::Mixture,
+        scenario::Filter::Bridge => Method::Mixture,
         scenario::Filter::Rejection => Method::RnnSampling,
     });
-    let default = || prior::default_folder(&root, &scenario.robot.name, arguments.quick);
+    let default = || prior::default_folder(&root, &scenario.prior_names(), arguments.quick);
     let folder = method.needs_prior().then(|| arguments.prior.clone().unwrap_or_else(default));
     let prior = folder.map(|folder| Suggester::load(&folder, &scenario.robot.name, &problem.model)).transpose()?;
     // What the method cannot do is said before a folder is made.

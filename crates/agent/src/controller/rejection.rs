@@ -1,11 +1,11 @@
-//! The method of the paper: POMCP from a belief that a particle filter keeps.
+//! The method of the paper: POMCP from a belief that a rejection filter keeps.
 
-use belief::Particles;
+use belief::{Particles, RejectionFilter};
 use planner::Pomcp;
-use pomdp::{Discretise as _, Proposals, Purpose, Rng, Seed};
+use pomdp::{Discretise as _, Proposals, Purpose, Rng, Seed, Updater as _};
 use prior::Suggester;
 use push_task::{Action, Observation, Particle, PushModel};
-use scenario::{Problem, Tracker};
+use scenario::Problem;
 
 use crate::controller::{Controller, Decision, Update, default_policy};
 use crate::proposals::{Context, Proposer};
@@ -13,12 +13,12 @@ use crate::record::End;
 use crate::{Error, Method, WorldStep};
 
 /// Searches from a belief, which the network helps to keep where the method has one.
-pub(crate) struct FilteredController<'a> {
+pub(crate) struct RejectionController<'a> {
     problem: &'a Problem,
     search: Pomcp<PushModel>,
     /// `None` once it is out of particles.
     belief: Option<Particles<Particle>>,
-    filter: Tracker<'a>,
+    filter: RejectionFilter,
     proposer: Option<Proposer<'a>>,
     /// Whether the object has ever been moved.
     object_moved: bool,
@@ -32,7 +32,7 @@ struct Streams {
     suggestion: Rng,
 }
 
-impl<'a> FilteredController<'a> {
+impl<'a> RejectionController<'a> {
     /// With the first belief, which knows the first observation; `prior` has seen it too.
     pub(crate) fn new(
         problem: &'a Problem,
@@ -48,7 +48,7 @@ impl<'a> FilteredController<'a> {
             problem,
             search: Pomcp::new(scenario.planner.clone())?,
             belief: Some(Particles::uniform(particles)?),
-            filter: problem.tracker(first)?,
+            filter: RejectionFilter::new(scenario.belief.rejection.clone())?,
             proposer: prior.map(|prior| Proposer::new(problem, method, prior, first)),
             object_moved: false,
             streams: Streams {
@@ -60,7 +60,7 @@ impl<'a> FilteredController<'a> {
     }
 }
 
-impl Controller for FilteredController<'_> {
+impl Controller for RejectionController<'_> {
     fn decide(&mut self, _: Option<&Particle>, remaining: usize) -> Result<Decision, Error> {
         let belief = self.belief.as_ref().expect("an episode ends when it is out of particles");
         let policy = default_policy(self.problem);
@@ -74,19 +74,13 @@ impl Controller for FilteredController<'_> {
         // Only moving the object pays more than a plain step; the goal, which pays too, ends the episode.
         self.object_moved |= answer.reward > self.problem.scenario.task.reward.step;
         let context = Context { model, observation, joints_rad, object_moved: self.object_moved };
-        let mut belief = self.belief.take().expect("an episode ends when it is out of particles");
+        let belief = self.belief.take().expect("an episode ends when it is out of particles");
         let mut drawn = Vec::new();
         if let Some(proposer) = &mut self.proposer {
-            (belief, drawn) = proposer.propose(belief, action, &context, &mut self.streams.suggestion)?;
+            drawn = proposer.propose(&belief, action, &context, &mut self.streams.suggestion);
         }
-        let density = |particle: &Particle| {
-            self.proposer.as_ref().map_or(f64::NEG_INFINITY, |proposer| proposer.log_density(particle))
-        };
-        let proposals = match &self.proposer {
-            Some(proposer) if proposer.knows_density() => Proposals::weighted(&drawn, &density),
-            _ => Proposals::unweighted(&drawn),
-        };
-        match self.filter.update(model, belief, action, observation, proposals, &mut self.streams.filter) {
+        let proposals = Proposals::new(&drawn);
+        match self.filter.update(model, belief, &action, observation, proposals, &mut self.streams.filter) {
             Ok((belief, report)) => {
                 let obstacle_share = obstacle_share(&belief);
                 self.belief = Some(with_known_joints(belief, joints_rad)?);
@@ -118,7 +112,7 @@ impl Controller for FilteredController<'_> {
 /// # Panics
 ///
 /// Where a particle has another number of joints.
-pub fn with_known_joints(
+pub(crate) fn with_known_joints(
     particles: Particles<Particle>,
     joints_rad: &[f64],
 ) -> Result<Particles<Particle>, belief::Error> {

@@ -1,0 +1,102 @@
+//! The method with a belief over whole histories: the network's estimate, and the exact likelihood as far as its draws carry it.
+
+use belief::{BridgeFilter, Particles};
+use planner::Pomcp;
+use pomdp::{Discretise as _, Prior as _, Purpose, Rng, Seed};
+use prior::Suggester;
+use push_task::{Action, Coordinates, History, Observation, Particle, PushModel};
+use scenario::{InitialObstacle, Problem};
+
+use crate::controller::{Controller, Decision, Update, default_policy, obstacle_share};
+use crate::record::End;
+use crate::{Error, Estimate, WorldStep};
+
+/// Searches from a belief over whole histories.
+pub(crate) struct BridgeController<'a> {
+    problem: &'a Problem,
+    search: Pomcp<PushModel>,
+    history: History<'a>,
+    filter: BridgeFilter<Particle, Estimate<'a>>,
+    prior: Option<&'a mut Suggester>,
+    /// `None` once it is out of particles.
+    belief: Option<Particles<Particle>>,
+    search_rng: Rng,
+    filter_rng: Rng,
+}
+
+impl<'a> BridgeController<'a> {
+    /// With the first belief, which knows the first observation and where the joints are, rad. `prior` is the network, where the method has
+    /// one.
+    pub(crate) fn new(
+        problem: &'a Problem,
+        mut prior: Option<&'a mut Suggester>,
+        first: &Observation,
+        seed: Seed,
+    ) -> Result<Self, Error> {
+        if let Some(network) = &mut prior {
+            network.reset();
+            network.suggest(None, first);
+        }
+        let history = history(problem, prior.as_deref(), first);
+        let mut filter_rng = seed.stream(Purpose::Filter, 0);
+        let estimate = estimate(&history, prior.as_deref());
+        let filter = BridgeFilter::new(problem.scenario.belief.bridge.clone(), &history, estimate, &mut filter_rng)?;
+        let belief = Some(filter.belief()?);
+        let search = Pomcp::new(problem.scenario.planner.clone())?;
+        let search_rng = seed.stream(Purpose::Search, 0);
+        Ok(Self { problem, search, history, filter, prior, belief, search_rng, filter_rng })
+    }
+}
+
+/// An episode that began with `first`. What a network has learnt of obstacles is its own prior where the scenario's first belief has none.
+#[must_use]
+pub fn history<'a>(problem: &'a Problem, prior: Option<&Suggester>, first: &Observation) -> History<'a> {
+    let mut distribution = problem.beliefs.clone();
+    if let (InitialObstacle::None, Some(network)) = (problem.scenario.initial_belief.obstacle, prior) {
+        distribution.obstacle.shape = network.obstacle_frequencies();
+    }
+    History::new(Coordinates::new(&problem.model, &distribution, &problem.start_joints_rad, first))
+}
+
+/// What the network says, or the prior.
+fn estimate<'a>(history: &History<'a>, prior: Option<&Suggester>) -> Estimate<'a> {
+    prior.map_or_else(|| Estimate::prior(history), |network| Estimate::network(history, network))
+}
+
+impl Controller for BridgeController<'_> {
+    fn decide(&mut self, _: Option<&Particle>, remaining: usize) -> Result<Decision, Error> {
+        let belief = self.belief.as_ref().expect("an episode ends when it is out of particles");
+        let policy = default_policy(self.problem);
+        let report = self.search.search(&self.problem.model, belief, policy, remaining, &mut self.search_rng);
+        Ok(Decision { action: report.action, search: Some(report) })
+    }
+
+    fn update(&mut self, action: Action, answer: &WorldStep) -> Result<Update, Error> {
+        self.history.push(action, &answer.observation, &answer.joints_rad);
+        if let Some(network) = &mut self.prior {
+            network.suggest(Some(&action), &answer.observation);
+        }
+        let estimate = estimate(&self.history, self.prior.as_deref());
+        match self.filter.update(&self.history, estimate, &mut self.filter_rng) {
+            Ok(report) => {
+                let belief = self.filter.belief()?;
+                let obstacle_share = obstacle_share(&belief);
+                self.belief = Some(belief);
+                Ok(Update::Belief { report, obstacle_share })
+            }
+            Err(belief::Error::Depleted { attempts, .. }) => {
+                self.belief = None;
+                Ok(Update::End(End::OutOfParticles { transitions: attempts }))
+            }
+            Err(error) => Err(error.into()),
+        }
+    }
+
+    fn prune(&mut self, action: Action, observation: &Observation) {
+        self.search.prune(&action, &self.problem.model.key(observation));
+    }
+
+    fn belief(&self) -> Option<&Particles<Particle>> {
+        self.belief.as_ref()
+    }
+}

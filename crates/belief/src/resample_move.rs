@@ -1,0 +1,10 @@
+//! The resample–move filter and its parts.
+
+mod config;
+mod filter;
+mod hypothesis;
+mod moves;
+
+pub use config::ResampleMoveConfig;
+pub use filter::ResampleMoveFilter;
+pub(crate) use hypothesis::{Hypothesis, replay};

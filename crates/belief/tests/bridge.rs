@@ -1,0 +1,401 @@
+//! The bridge filter against exact posteriors: a line with a walk on top, and whether there is a second body.
+
+mod line;
+
+use belief::{BridgeConfig, BridgeFilter, Error, Particles};
+use line::{Exact, HEIGHT, Line, NOW, SLOPE, State, log_gaussian, normal};
+use pomdp::{Purpose, Rng, Seed, Teacher, UpdateReport};
+use rand::RngExt as _;
+
+/// A Gaussian over the first `size` coordinates (x_0, slope, height / 2), by mean and Cholesky factor; the others keep the prior.
+#[derive(Clone)]
+struct Gaussian {
+    size: usize,
+    mean: [f64; 3],
+    factor: [[f64; 3]; 3],
+}
+
+impl Gaussian {
+    fn log_density(&self, z: [f64; 3]) -> f64 {
+        let mut standard = [0.0; 3];
+        let mut total = 0.0;
+        for i in 0..self.size {
+            let rest: f64 = (0..i).map(|j| self.factor[i][j] * standard[j]).sum();
+            standard[i] = (z[i] - self.mean[i] - rest) / self.factor[i][i];
+            total += log_gaussian(standard[i], 1.0) - self.factor[i][i].ln();
+        }
+        total
+    }
+
+    fn draw(&self, rng: &mut Rng) -> Vec<f64> {
+        let standard: [f64; 3] = std::array::from_fn(|_| normal(rng));
+        let correlated = |i: usize| self.mean[i] + (0..=i).map(|j| self.factor[i][j] * standard[j]).sum::<f64>();
+        (0..3).map(|i| if i < self.size { correlated(i) } else { standard[i] }).collect()
+    }
+}
+
+/// A teacher that is the exact posterior of the start, or is wrong in a known way.
+#[derive(Clone)]
+struct Guess {
+    /// Probability of a second body; that of the prior.
+    second: (f64, f64),
+    parts: [Gaussian; 2],
+    /// Share of the draws that are impossible.
+    impossible: f64,
+}
+
+impl Guess {
+    /// The exact posterior, moved by `shift` standard deviations along one direction, `width` times as wide, with the probability of a second
+    /// body `doubt` of the way to the prior's.
+    fn wrong(line: &Line, shift: f64, width: f64, doubt: f64) -> Self {
+        let exact = Exact::new(line);
+        let part = |class: usize| {
+            let kalman = &exact.parts[class];
+            let unit = [1.0, 1.0, HEIGHT];
+            let mut mean: [f64; 3] = std::array::from_fn(|i| kalman.mean[1 + i] / unit[i]);
+            let covariance = |i: usize, j: usize| kalman.covariance[1 + i][1 + j] / (unit[i] * unit[j]);
+            let mut factor = [[0.0_f64; 3]; 3];
+            let size = 2 + class;
+            for i in 0..size {
+                for j in 0..=i {
+                    let rest = covariance(i, j) - (0..j).map(|k| factor[i][k] * factor[j][k]).sum::<f64>();
+                    factor[i][j] = if i == j { rest.sqrt() } else { rest / factor[j][j] };
+                }
+            }
+            for i in 0..size {
+                mean[i] += shift * factor[i][0];
+                factor[i].iter_mut().for_each(|value| *value *= width);
+            }
+            Gaussian { size, mean, factor }
+        };
+        let second = (1.0 - doubt) * exact.second + doubt * line.second();
+        Self { second: (second, line.second()), parts: [part(0), part(1)], impossible: 0.0 }
+    }
+
+    fn exact(line: &Line) -> Self {
+        Self::wrong(line, 0.0, 1.0, 0.0)
+    }
+
+    fn prior(line: &Line) -> Self {
+        Self::exact(&Line::new(line.q, line.r, line.second()))
+    }
+}
+
+impl Teacher<State> for Guess {
+    fn draw(&self, rng: &mut Rng) -> Option<(Vec<usize>, Vec<f64>)> {
+        let class = usize::from(rng.random::<f64>() < self.second.0);
+        if rng.random::<f64>() < self.impossible {
+            return None;
+        }
+        Some((vec![class], self.parts[class].draw(rng)))
+    }
+
+    fn log_ratio(&self, start: &State) -> f64 {
+        let class = usize::from(start.height != 0.0);
+        let z = [start.x, start.slope, start.height / HEIGHT];
+        let probability = |second: f64| if class == 1 { second } else { 1.0 - second };
+        let prior: f64 = z[..2 + class].iter().map(|z| log_gaussian(*z, 1.0)).sum();
+        let class_ratio = probability(self.second.0) / probability(self.second.1);
+        (class_ratio * (1.0 - self.impossible)).ln() + self.parts[class].log_density(z) - prior
+    }
+}
+
+/// How episodes are made.
+struct Setting<'a> {
+    q: f64,
+    steps: usize,
+    config: BridgeConfig,
+    teacher: &'a dyn Fn(&Line) -> Guess,
+}
+
+/// An episode of a world drawn from the prior.
+struct Found {
+    truth: State,
+    belief: Particles<State>,
+    exact: Exact,
+    /// ln p of all readings.
+    log_evidence: f64,
+    reports: Vec<UpdateReport>,
+}
+
+fn episode(setting: &Setting<'_>, item: u64) -> Found {
+    let mut rng = Seed(21).stream(Purpose::Test, item);
+    let mut filter_rng = Seed(22).stream(Purpose::Test, item);
+    let mut line = Line::new(setting.q, 0.3, 0.5);
+    let mut truth = line.draw(&mut rng);
+    let first = (setting.teacher)(&line);
+    let mut filter = BridgeFilter::new(setting.config.clone(), &line, first, &mut filter_rng).unwrap();
+    let reports = (0..setting.steps).map(|_| {
+        line.act(&mut truth, &mut rng);
+        filter.update(&line, (setting.teacher)(&line), &mut filter_rng).unwrap()
+    });
+    let reports = reports.collect();
+    let exact = Exact::new(&line);
+    Found { truth, belief: filter.belief().unwrap(), log_evidence: exact.log_evidence(&line), exact, reports }
+}
+
+fn episodes(setting: &Setting<'_>, count: u64) -> Vec<Found> {
+    (0..count).map(|item| episode(setting, item)).collect()
+}
+
+impl Found {
+    fn last(&self) -> &UpdateReport {
+        self.reports.last().unwrap()
+    }
+
+    fn moments(&self, value: impl Fn(&State) -> f64) -> (f64, f64) {
+        let mean: f64 = self.belief.iter().map(|(state, w)| w * value(state)).sum();
+        (mean, self.belief.iter().map(|(state, w)| w * (value(state) - mean).powi(2)).sum())
+    }
+
+    /// Probability of values below the truth's.
+    fn rank(&self, value: impl Fn(&State) -> f64) -> f64 {
+        let truth = value(&self.truth);
+        self.belief.iter().filter(|(state, _)| value(state) < truth).map(|(_, w)| w).sum()
+    }
+
+    fn second(&self) -> f64 {
+        self.belief.iter().filter(|(state, _)| state.height != 0.0).map(|(_, w)| w).sum()
+    }
+}
+
+/// What is compared: its place in the exact posterior, and its value in a state.
+type Quantity = (usize, fn(&State) -> f64);
+
+const PLACES: [Quantity; 2] = [(NOW, |state| state.x), (SLOPE, |state| state.slope)];
+
+fn mean_and_error(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt())
+}
+
+/// Means, variances and class probabilities against the exact ones. Null: errors of `size` independent draws. Errors of means have a standard
+/// deviation of 1 / √size posterior spreads, errors of probabilities at most 0.5 / √size; their root mean squares may be twice as large, as `size` varies
+/// between episodes. Their averages over episodes are 0 within 4 standard errors and 1 / size, the order of a ratio's bias; so are those of
+/// relative variances, whose bias is a few times that.
+fn assert_exact(found: &[Found], size: f64) {
+    let check = |what: &str, errors: &[f64], rms_most: f64, bias: f64| {
+        let (mean, error) = mean_and_error(errors);
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        println!("{what}: mean {mean:.4} ± {error:.4}, rms {rms:.4} of at most {rms_most:.4}");
+        assert!(mean.abs() < 4.0 * error + bias, "{what}: {mean} ± {error}");
+        assert!(rms < rms_most, "{what}: {rms} of {rms_most}");
+    };
+    for (place, value) in PLACES {
+        let of = |error: &dyn Fn((f64, f64), (f64, f64)) -> f64| -> Vec<f64> {
+            found.iter().map(|f| error(f.moments(value), f.exact.moments(place))).collect()
+        };
+        check("mean", &of(&|(m, _), (exact, variance)| (m - exact) / variance.sqrt()), 2.0 / size.sqrt(), 1.0 / size);
+        // The variance of n draws errs by √(2 / n) of itself.
+        check("variance", &of(&|(_, v), (_, variance)| v / variance - 1.0), 2.0 * (2.0 / size).sqrt(), 3.0 / size);
+    }
+    let second: Vec<f64> = found.iter().map(|f| f.second() - f.exact.second).collect();
+    check("second body", &second, 1.0 / size.sqrt(), 1.0 / size);
+}
+
+#[test]
+fn draws_from_the_posterior_have_equal_weights() {
+    // Without a walk the likelihood of a start is exact, so that the weights of an exact teacher's draws are equal but for rounding.
+    let config = BridgeConfig { draws: 100, kept: 1, effective: 100.0 };
+    let found = episodes(&Setting { q: 0.0, steps: 6, config, teacher: &Guess::exact }, 10);
+    for report in found.iter().flat_map(|f| &f.reports) {
+        assert!((report.effective_sample_size_before - 100.0).abs() < 1e-6, "{report:?}");
+        assert!((report.effective_sample_size - 100.0).abs() < 1e-6, "{report:?}");
+        assert_eq!(report.particles, 100);
+    }
+    // ln p of the readings is then met by every draw, whatever the seed.
+    for f in &found {
+        let sum: f64 = f.reports.iter().map(|report| report.log_evidence).sum();
+        assert!((sum - f.log_evidence).abs() < 1e-8, "{sum} {}", f.log_evidence);
+    }
+}
+
+#[test]
+fn an_exact_teacher_leads_to_the_exact_posterior() {
+    let config = BridgeConfig { draws: 400, kept: 1, effective: 5.0 };
+    let found = episodes(&Setting { q: 0.2, steps: 6, config, teacher: &Guess::exact }, 100);
+    let least = found.iter().flat_map(|f| &f.reports).map(|r| r.effective_sample_size).fold(f64::INFINITY, f64::min);
+    println!("smallest effective size {least:.1}");
+    assert!(found.iter().flat_map(|f| &f.reports).all(|report| report.temperature == 1.0));
+    let size = mean_and_error(&found.iter().map(|f| f.last().effective_sample_size).collect::<Vec<_>>()).0;
+    assert!(size > 80.0, "the walk costs less than four fifths of the draws: {size}");
+    assert_exact(&found, size);
+    // ln of an unbiased estimate is low by half its relative variance, 1 / (2 size) or less.
+    let errors: Vec<f64> = found
+        .iter()
+        .map(|f| f.reports.iter().map(|report| report.log_evidence).sum::<f64>() - f.log_evidence)
+        .collect();
+    let (mean, error) = mean_and_error(&errors);
+    assert!(mean.abs() < 4.0 * error + 0.5 / size, "{mean} ± {error}");
+}
+
+#[test]
+fn many_draws_from_the_prior_lead_to_the_exact_posterior() {
+    let config = BridgeConfig { draws: 40_000, kept: 1, effective: 20.0 };
+    let found = episodes(&Setting { q: 0.2, steps: 3, config, teacher: &Guess::prior }, 12);
+    assert!(found.iter().all(|f| f.last().temperature == 1.0));
+    // Few draws explain a truth that is far out: the smallest effective size decides what errors may be.
+    let size = found.iter().map(|f| f.last().effective_sample_size).fold(f64::INFINITY, f64::min);
+    assert_exact(&found, size);
+}
+
+#[test]
+fn a_broad_and_shifted_teacher_is_corrected() {
+    let teacher = |line: &Line| Guess::wrong(line, 1.0, 2.0, 0.5);
+    let config = BridgeConfig { draws: 2000, kept: 1, effective: 10.0 };
+    let found = episodes(&Setting { q: 0.2, steps: 6, config, teacher: &teacher }, 60);
+    assert!(found.iter().flat_map(|f| &f.reports).all(|report| report.temperature == 1.0));
+    let size = mean_and_error(&found.iter().map(|f| f.last().effective_sample_size).collect::<Vec<_>>()).0;
+    assert_exact(&found, size);
+}
+
+#[test]
+fn too_few_draws_show_as_width() {
+    let config = BridgeConfig { draws: 100, kept: 1, effective: 50.0 };
+    let found = episodes(&Setting { q: 0.2, steps: 6, config, teacher: &Guess::prior }, 300);
+    let tempered = found.iter().filter(|f| f.last().temperature < 1.0).count();
+    assert!(tempered == found.len(), "{tempered} of {}", found.len());
+    for report in found.iter().map(Found::last) {
+        // The effective size is a continuous function of the exponent: the bisection ends at the one asked for.
+        assert!((report.effective_sample_size - 50.0).abs() < 1e-3, "{report:?}");
+        assert!(report.effective_sample_size_before < 50.0, "{report:?}");
+    }
+    for (place, value) in PLACES {
+        let ranks: Vec<f64> = found.iter().map(|f| f.rank(value)).collect();
+        let covered = ranks.iter().filter(|rank| (0.05..=0.95).contains(*rank)).count() as f64 / ranks.len() as f64;
+        let ratio =
+            mean_and_error(&found.iter().map(|f| f.moments(value).1 / f.exact.moments(place).1).collect::<Vec<_>>()).0;
+        println!("coverage {covered:.3}, variance {ratio:.2} times the posterior's");
+        // A calibrated belief covers 90 %, and of 300 episodes less than 85 % with probability 0.003. The posterior's own variance would be a ratio of 1.
+        assert!(covered >= 0.85, "{covered}");
+        assert!(ratio > 1.5, "{ratio}");
+    }
+}
+
+#[test]
+fn kept_draws_count_as_much_as_new_ones() {
+    // Every teacher errs to another side, by as much as it is wide. What one of them suggests is mostly impossible.
+    let teacher = |line: &Line| {
+        let odd = line.readings.len() % 2 == 1;
+        let guess = Guess::wrong(line, if odd { -1.0 } else { 1.0 }, 1.5, 0.5);
+        Guess { impossible: if odd { 0.8 } else { 0.0 }, ..guess }
+    };
+    let of = |draws: usize, kept: usize| {
+        let config = BridgeConfig { draws, kept, effective: 20.0 };
+        episodes(&Setting { q: 0.2, steps: 6, config, teacher: &teacher }, 60)
+    };
+    let (kept, single) = (of(400, 5), of(2000, 1));
+    for found in [&kept, &single] {
+        assert!(found.iter().all(|f| f.last().temperature == 1.0));
+        let size = mean_and_error(&found.iter().map(|f| f.last().effective_sample_size).collect::<Vec<_>>()).0;
+        println!("effective size {size:.0}");
+        assert_exact(found, size);
+    }
+    assert!(kept.iter().all(|f| f.last().particles == 2000), "five batches are kept");
+    // A batch of this step's draws costs a replay of six steps, each of the four others and the one that is dropped a step.
+    assert!(kept.iter().all(|f| f.last().transitions == 400 * 6 + 5 * 400));
+}
+
+#[test]
+fn the_truths_ranks_are_uniform() {
+    let teacher = |line: &Line| Guess::wrong(line, 0.0, 1.3, 0.2);
+    let config = BridgeConfig { draws: 300, kept: 3, effective: 30.0 };
+    let found = episodes(&Setting { q: 0.2, steps: 5, config, teacher: &teacher }, 600);
+    for (_, value) in PLACES {
+        let mut counts = [0.0; 10];
+        for f in &found {
+            counts[((10.0 * f.rank(value)) as usize).min(9)] += 1.0;
+        }
+        // Null: uniform over ten bins. χ² with 9 degrees of freedom exceeds 27.9 with probability 0.001.
+        let chi_squared: f64 = counts.iter().map(|count: &f64| (count - 60.0).powi(2) / 60.0).sum();
+        println!("χ² {chi_squared:.1}");
+        assert!(chi_squared < 27.9, "{chi_squared}: {counts:?}");
+    }
+    // Null: P(second body) is the frequency of second bodies among worlds with such histories.
+    let errors: Vec<f64> = found.iter().map(|f| f.second() - f64::from(u8::from(f.truth.height != 0.0))).collect();
+    let (mean, error) = mean_and_error(&errors);
+    assert!(mean.abs() < 4.0 * error, "{mean} ± {error}");
+}
+
+#[test]
+fn results_are_the_same_for_any_number_of_threads() {
+    let config = BridgeConfig { draws: 200, kept: 3, effective: 100.0 };
+    let text = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let teacher = |line: &Line| Guess::wrong(line, 0.5, 1.5, 0.2);
+            let setting = Setting { q: 0.2, steps: 6, config: config.clone(), teacher: &teacher };
+            let found = episode(&setting, 0);
+            // Debug writes every bit of a number.
+            format!("{:?} {:?}", found.belief, found.reports)
+        })
+    };
+    assert_eq!(text(1), text(2));
+}
+
+/// A teacher that suggests nothing.
+#[derive(Clone)]
+struct Mute;
+
+impl Teacher<State> for Mute {
+    fn draw(&self, _rng: &mut Rng) -> Option<(Vec<usize>, Vec<f64>)> {
+        None
+    }
+
+    fn log_ratio(&self, _start: &State) -> f64 {
+        f64::NEG_INFINITY
+    }
+}
+
+#[test]
+fn depletion_is_an_error_and_no_belief() {
+    let config = BridgeConfig { draws: 50, kept: 3, effective: 20.0 };
+    let mut rng = Seed(1).stream(Purpose::Test, 0);
+    let mut line = Line::new(0.2, 0.3, 0.5);
+    let mute = BridgeFilter::new(config.clone(), &line, Mute, &mut rng);
+    assert!(matches!(mute, Err(Error::Depleted { .. })), "nothing was suggested");
+    // A reading that has probability 0 in floating point, and one that is none.
+    for reading in [1e200, f64::NAN] {
+        line.readings = vec![0.5];
+        let mut filter =
+            BridgeFilter::new(config.clone(), &Line::new(0.2, 0.3, 0.5), Guess::prior(&line), &mut rng).unwrap();
+        filter.update(&line, Guess::prior(&line), &mut rng).unwrap();
+        line.readings.push(reading);
+        let error = filter.update(&line, Guess::prior(&line), &mut rng).unwrap_err();
+        assert!(matches!(error, Error::Depleted { attempts, .. } if attempts >= 50), "{error}");
+        assert!(filter.belief().is_err(), "no belief is left");
+    }
+}
+
+#[test]
+fn what_the_latest_teacher_excludes_stays_possible() {
+    // The second teacher says that there is no second body; the first one's draws of it are still explained, so that the posterior keeps them.
+    let exact = |line: &Line| Guess::exact(line);
+    let sure = |line: &Line| {
+        let mut guess = Guess::exact(line);
+        guess.second.0 = 0.0;
+        guess
+    };
+    let teacher = |line: &Line| if line.readings.len() == 4 { sure(line) } else { exact(line) };
+    let config = BridgeConfig { draws: 2000, kept: 3, effective: 20.0 };
+    let found = episodes(&Setting { q: 0.2, steps: 4, config, teacher: &teacher }, 40);
+    assert!(found.iter().all(|f| f.last().temperature == 1.0));
+    let size = mean_and_error(&found.iter().map(|f| f.last().effective_sample_size).collect::<Vec<_>>()).0;
+    assert_exact(&found, size);
+}
+
+#[test]
+fn settings_outside_their_limits_are_refused() {
+    let good = BridgeConfig::default();
+    assert_eq!(good.validate(), Ok(()));
+    for bad in [
+        BridgeConfig { draws: 0, ..good.clone() },
+        BridgeConfig { kept: 0, ..good.clone() },
+        BridgeConfig { effective: 0.5, ..good.clone() },
+        BridgeConfig { effective: f64::NAN, ..good.clone() },
+        BridgeConfig { effective: 101.0, ..good.clone() },
+    ] {
+        assert!(matches!(bad.validate(), Err(Error::Config { .. })), "{bad:?}");
+    }
+}

@@ -1,0 +1,107 @@
+//! How far a belief can be trusted: fresh worlds, played with the agent, and what prior, network and filter say at each step.
+//!
+//! Everything is about worlds: an interval of a figure is a bootstrap over them, because the steps of an episode share one world. The filter is
+//! asked in the very episode that its agent plays. Prior and network, on the same history, give as many draws as the filter has effective ones.
+
+mod episode;
+mod figures;
+mod summary;
+mod table;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result, ensure};
+use prior::Suggester;
+use rayon::prelude::*;
+use scenario::{Problem, Selection};
+use serde_json::{Value, json};
+use whole_file::Existing;
+
+pub use episode::{Row, World};
+pub use table::table;
+
+/// The preset whose belief is looked at.
+const PRESET: &str = "surmise";
+/// Most bytes of a world's file.
+const MOST_BYTES: u64 = 1 << 24;
+
+/// What to run.
+#[derive(Clone, Debug)]
+pub struct Task {
+    /// Domain or scenario file.
+    pub domain: String,
+    /// Arm.
+    pub robot: Option<String>,
+    /// Worlds.
+    pub worlds: u32,
+    /// Root seed.
+    pub seed: u64,
+    /// With the budgets of `--quick`.
+    pub quick: bool,
+    /// Scenario entries, key=value.
+    pub set: Vec<String>,
+    /// Folder of the network; the default one where `None`.
+    pub prior: Option<PathBuf>,
+}
+
+/// Plays the worlds that `out` does not have yet, and writes `calibration.json`, `calibration.md` and pictures there.
+///
+/// # Errors
+///
+/// A scenario or network that does not load, a world that contradicts it, and a folder of another task.
+pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> Result<Value> {
+    let mut selection = Selection {
+        domain: task.domain.clone(),
+        preset: PRESET.into(),
+        quick: task.quick,
+        set: task.set.clone(),
+        ..Selection::new(root)
+    };
+    if let Some(robot) = &task.robot {
+        selection.robot.clone_from(robot);
+    }
+    let scenario = selection.load()?;
+    let problem = Problem::assemble(&scenario, root)?;
+    let folder = task.prior.clone().unwrap_or_else(|| prior::default_folder(root, &scenario.prior_names(), task.quick));
+    let network = Suggester::load(&folder, &scenario.robot.name, &problem.model)?;
+    let identity = json!({
+        "scenario": scenario, "seed": task.seed, "network": network.hash(),
+    });
+    let own = out.join("task.json");
+    if own.exists() {
+        let found: Value = serde_json::from_slice(&whole_file::read(&own, MOST_BYTES)?)
+            .with_context(|| format!("{} is no task of this benchmark: move it away", own.display()))?;
+        ensure!(found == identity, "{} holds the worlds of another task: choose another folder", out.display());
+    } else {
+        std::fs::create_dir_all(out.join("worlds"))
+            .with_context(|| format!("cannot make the folder {}", out.display()))?;
+        whole_file::write(&own, pretty(&identity).as_bytes(), Existing::Keep)?;
+    }
+    let world = |number: u32| -> Result<World> {
+        let path = out.join(format!("worlds/{number:04}.json"));
+        if path.exists() {
+            return serde_json::from_slice(&whole_file::read(&path, MOST_BYTES)?)
+                .with_context(|| format!("{} is no world of this benchmark: move it away", path.display()));
+        }
+        let world = episode::play(&problem, &network, pomdp::Seed(task.seed), number)?;
+        whole_file::write(&path, serde_json::to_string(&world)?.as_bytes(), Existing::Replace)?;
+        note(&format!("world {number}: {} after {} actions", world.reason, world.filter.len() - 1));
+        Ok(world)
+    };
+    let worlds: Vec<World> = (0..task.worlds).into_par_iter().map(world).collect::<Result<_>>()?;
+    let summary = summary::summary(
+        &worlds,
+        &json!({
+            "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": task.seed,
+            "set": task.set, "quick": task.quick, "network": network.hash(), "commit": scenario::commit(root),
+        }),
+    );
+    whole_file::write(&out.join("calibration.json"), pretty(&summary).as_bytes(), Existing::Replace)?;
+    whole_file::write(&out.join("calibration.md"), table(&summary).as_bytes(), Existing::Replace)?;
+    figures::save(&summary, out)?;
+    Ok(summary)
+}
+
+fn pretty(value: &Value) -> String {
+    serde_json::to_string_pretty(value).expect("plain data has a JSON form") + "\n"
+}

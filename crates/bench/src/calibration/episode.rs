@@ -1,0 +1,255 @@
+//! One world: an episode, and what each source says of it at each step.
+
+use agent::{Agent, Estimate, Method, SimulatedWorld, StepView, Watcher};
+use anyhow::Result;
+use belief::Particles;
+use pomdp::{Belief as _, Prior as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
+use prior::Suggester;
+use push_task::{Action, Observation, Particle};
+use rand::RngExt as _;
+use scenario::Problem;
+use serde::{Deserialize, Serialize};
+
+/// Draws from prior and network at each step.
+const DRAWS: usize = 100;
+
+/// Numbers whose ranks are taken: names, and whether only hypotheses of the true shape have them.
+pub(super) const NUMBERS: [(&str, bool); 8] = [
+    ("mass", false),
+    ("friction", false),
+    ("size_0", true),
+    ("size_1", true),
+    ("size_2", true),
+    ("com_x", true),
+    ("com_y", true),
+    ("com_z", true),
+];
+
+/// What one belief says of the true world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Probability of an obstacle.
+    pub obstacle: f64,
+    /// Probability of the object's true shape, and of the obstacle's true class, or none.
+    pub shape: f64,
+    /// See `shape`.
+    pub obstacle_class: f64,
+    /// P(number < true one) + P(equal) u with u uniform, for each of [`NUMBERS`]; null where the shape has no such number.
+    pub ranks: Vec<Option<f64>>,
+    /// Mean of ln mass minus the true one.
+    pub log_mass_error: f64,
+    /// Mean of friction minus the true one.
+    pub friction_error: f64,
+    /// ln of the probability of shape and obstacle's class, and of Gaussians of ln mass and friction, at the truth.
+    pub log_score: f64,
+    /// P(nearer to a random point than the truth is): uniform for a calibrated joint belief (TARP; Lemos et al. 2023).
+    pub tarp: f64,
+    /// Distance of the obstacle's mean place from the true one, m, where both have one.
+    pub obstacle_m: Option<f64>,
+}
+
+/// A world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct World {
+    /// Why the episode ended.
+    pub reason: String,
+    /// Σ γ^t r_t.
+    pub discounted_return: f64,
+    /// Whether there is an obstacle.
+    pub has_obstacle: bool,
+    /// Step of the first contact of the tool with the object, from 1; null where there was none.
+    pub first_contact: Option<usize>,
+    /// What the filter says: before the first action and after each one but the last.
+    pub filter: Vec<Row>,
+    /// What the prior says.
+    pub prior: Vec<Row>,
+    /// What the network says.
+    pub network: Vec<Row>,
+    /// Transitions of each update.
+    pub transitions: Vec<usize>,
+    /// Exponent that each update has reached.
+    pub exponents: Vec<f64>,
+    /// Wall-clock time of search and update, mean over the actions, s.
+    pub seconds: f64,
+}
+
+/// Looks on and keeps what later replays need.
+struct Onlooker {
+    truth: Option<Particle>,
+    rows: Vec<Row>,
+    steps: Vec<(Action, Observation)>,
+    transitions: Vec<usize>,
+    exponents: Vec<f64>,
+    rng: Rng,
+}
+
+impl Watcher for Onlooker {
+    fn see(&mut self, view: &StepView<'_>) {
+        let Some(truth) = view.truth else { return };
+        self.truth.get_or_insert_with(|| truth.clone());
+        let Some(belief) = view.belief else { return };
+        self.rows.push(row(belief, truth, &mut self.rng));
+        if let Some(step) = view.step {
+            self.steps.push((step.action, step.observation.clone()));
+            if let Some(update) = &step.update {
+                self.transitions.push(update.transitions);
+                self.exponents.push(update.temperature);
+            }
+        }
+    }
+}
+
+/// Plays world `number`.
+pub(super) fn play(problem: &Problem, network: &Suggester, root: Seed, number: u32) -> Result<World> {
+    let seed = root.child(Purpose::World, u64::from(number));
+    let start = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
+    let has_obstacle = start.theta.obstacle.is_some();
+    let mut first = start.clone();
+    let observation = problem.truth.initial_observation(&mut first, &mut seed.stream(Purpose::Truth, 0));
+    let mut world = SimulatedWorld::new(&problem.truth, start.clone(), seed.stream(Purpose::Truth, 0));
+    let mut onlooker = Onlooker {
+        truth: None,
+        rows: Vec::new(),
+        steps: Vec::new(),
+        transitions: Vec::new(),
+        exponents: Vec::new(),
+        rng: seed.stream(Purpose::Statistics, 0),
+    };
+    #[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
+    let started = std::time::Instant::now();
+    let episode = Agent::new(problem, Method::Mixture, Some(network))?.run_watched(&mut world, seed, &mut onlooker)?;
+    let seconds = started.elapsed().as_secs_f64() / episode.steps.len().max(1) as f64;
+
+    let mut rng = seed.stream(Purpose::Statistics, 1);
+    let mut network = network.clone();
+    network.reset();
+    network.suggest(None, &observation);
+    let history = agent::history(problem, Some(&network), &observation);
+    let prior = Estimate::prior(&history);
+    let mut draws = |estimate: &Estimate<'_>| -> Result<Row> {
+        let drawn = (0..10 * DRAWS).filter_map(|_| {
+            let (classes, z) = estimate.draw(&mut rng)?;
+            Some(history.start(&classes, &z)?.0)
+        });
+        let belief = Particles::uniform(drawn.take(DRAWS).collect())?;
+        Ok(row(&belief, &start, &mut rng))
+    };
+    let (mut of_prior, mut of_network) = (vec![draws(&prior)?], vec![draws(&Estimate::network(&history, &network))?]);
+    for (action, observation) in &onlooker.steps {
+        network.suggest(Some(action), observation);
+        of_prior.push(draws(&prior)?);
+        of_network.push(draws(&Estimate::network(&history, &network))?);
+    }
+    let touched =
+        |row: &agent::StepRecord| row.large_force || row.obstacle_touched || moved(&row.observation, &observation);
+    Ok(World {
+        reason: episode.reason.name().into(),
+        discounted_return: episode.discounted_return,
+        has_obstacle,
+        first_contact: episode.steps.iter().position(touched).map(|index| index + 1),
+        filter: onlooker.rows,
+        prior: of_prior,
+        network: of_network,
+        transitions: onlooker.transitions,
+        exponents: onlooker.exponents,
+        seconds,
+    })
+}
+
+/// Whether the object is seen 1 cm or more from where it was first seen: five standard deviations.
+fn moved(now: &Observation, first: &Observation) -> bool {
+    let (a, b) = (now.object_pose().0, first.object_pose().0);
+    (a[0] - b[0]).hypot(a[1] - b[1]) > 0.01
+}
+
+/// The numbers of [`NUMBERS`].
+fn numbers(particle: &Particle) -> [f64; 8] {
+    let o = &particle.theta.object;
+    let ([a, b, c], [x, y, z]) = (o.size_m, o.com_m);
+    [o.mass_kg, o.friction, a, b, c, x, y, z]
+}
+
+/// Whether the true object has a number.
+fn has(truth: &Particle, index: usize) -> bool {
+    let shape = truth.theta.object.shape;
+    match index {
+        0 | 1 | 7 => true,
+        2..=4 => index - 2 < shape.size_count(),
+        _ => shape.size_count() > 1,
+    }
+}
+
+fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng) -> Row {
+    let weighted: Vec<(&Particle, f64)> = belief.iter().filter(|(_, weight)| *weight > 0.0).collect();
+    let mean = |value: &dyn Fn(&Particle) -> f64| weighted.iter().map(|(p, w)| w * value(p)).sum::<f64>();
+    let share = |holds: &dyn Fn(&Particle) -> bool| mean(&|p| f64::from(u8::from(holds(p))));
+    let [true_shape, true_obstacle] = truth.theta.classes();
+    let shape = share(&|p| p.theta.classes()[0] == true_shape);
+    let obstacle_class = share(&|p| p.theta.classes()[1] == true_obstacle);
+    let both = share(&|p| p.theta.classes() == [true_shape, true_obstacle]);
+    let true_numbers = numbers(truth);
+    let ranks = (0..NUMBERS.len()).map(|index| {
+        let of_shape = |p: &Particle| !NUMBERS[index].1 || p.theta.classes()[0] == true_shape;
+        let mass = share(&of_shape);
+        let u: f64 = rng.random();
+        (has(truth, index) && mass > 0.0).then(|| {
+            let below = share(&|p| of_shape(p) && numbers(p)[index] < true_numbers[index]);
+            let equal = share(&|p| of_shape(p) && numbers(p)[index] == true_numbers[index]);
+            (below + u * equal) / mass
+        })
+    });
+    let ranks = ranks.collect();
+    let gaussian = |value: &dyn Fn(&Particle) -> f64| {
+        let m = mean(value);
+        let variance = mean(&|p| (value(p) - m).powi(2)).max(1e-6);
+        let error = m - value(truth);
+        (error, -0.5 * error * error / variance - 0.5 * (2.0 * std::f64::consts::PI * variance).ln())
+    };
+    let (log_mass_error, mass_score) = gaussian(&|p| p.theta.object.mass_kg.ln());
+    let (friction_error, friction_score) = gaussian(&|p| p.theta.object.friction);
+    // The mass of a class that no draw has is at most a draw's.
+    let floor = 0.5 / weighted.len() as f64;
+    let obstacle_m = truth.state.obstacle.as_ref().and_then(|body| {
+        let with = share(&|p| p.state.obstacle.is_some());
+        let off = |axis: usize| {
+            let sum = mean(&|p| p.state.obstacle.as_ref().map_or(0.0, |o| o.position_m[axis]));
+            sum / with - body.position_m[axis]
+        };
+        (with > 0.0).then(|| off(0).hypot(off(1)))
+    });
+    Row {
+        obstacle: share(&|p| p.theta.obstacle.is_some()),
+        shape,
+        obstacle_class,
+        ranks,
+        log_mass_error,
+        friction_error,
+        log_score: both.max(floor).ln() + mass_score + friction_score,
+        tarp: tarp(belief, truth, rng),
+        obstacle_m,
+    }
+}
+
+/// ln mass, friction and half extents, m, in units of about their prior spreads, and the classes.
+fn joint(particle: &Particle) -> [f64; 7] {
+    let o = &particle.theta.object;
+    let [x, y, z] = o.shape.half_extents_m(o.size_m);
+    let [shape, obstacle] = particle.theta.classes();
+    [
+        o.mass_kg.ln() / 0.4,
+        o.friction / 0.13,
+        x / 0.006,
+        y / 0.006,
+        z / 0.005,
+        2.0 * shape as f64,
+        2.0 * obstacle as f64,
+    ]
+}
+
+fn tarp(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng) -> f64 {
+    // A point that knows nothing of the truth: a draw of the belief, blurred.
+    let centre = joint(belief.sample(rng)).map(|value| value + 2.0 * (rng.random::<f64>() - 0.5));
+    let distance = |particle: &Particle| joint(particle).iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    let of_truth = distance(truth);
+    belief.iter().filter(|(particle, _)| distance(particle) < of_truth).map(|(_, weight)| weight).sum()
+}

@@ -1,0 +1,85 @@
+//! The figures as Markdown.
+
+use serde_json::Value;
+
+use super::episode::NUMBERS;
+use super::summary::{SOURCES, STEPS};
+
+/// Columns: figure, title, digits.
+const COLUMNS: [(&str, &str, usize); 8] = [
+    ("obstacle_brier", "Brier of the obstacle", 3),
+    ("obstacle_brier_without_obstacle", "the same, worlds without one", 3),
+    ("shape_nats", "−ln P(true shape)", 2),
+    ("obstacle_class_nats", "−ln P(obstacle's class)", 2),
+    ("log_mass_error", "error of ln mass", 2),
+    ("friction_error", "error of friction", 3),
+    ("log_score", "log score of Θ", 2),
+    ("obstacle_m", "obstacle off, m", 3),
+];
+
+/// The summary as a page.
+#[must_use]
+pub fn table(summary: &Value) -> String {
+    let p = &summary["provenance"];
+    let mut text = format!(
+        "# Calibration of the belief: {} on the {}\n\n{} worlds of seed {}, preset {}. In brackets: 95 % by bootstrap over worlds.\n\n",
+        p["domain"].as_str().unwrap_or_default(),
+        p["robot"].as_str().unwrap_or_default(),
+        p["worlds"],
+        p["seed"],
+        p["preset"].as_str().unwrap_or_default()
+    );
+    text += "| step | belief |";
+    COLUMNS.iter().for_each(|(_, title, _)| text += &format!(" {title} |"));
+    text += &format!("\n|---|---|{}\n", "---|".repeat(COLUMNS.len()));
+    rows(summary, &mut text, |cells| {
+        COLUMNS.iter().map(|(figure, _, digits)| interval(&cells[*figure], *digits)).collect()
+    });
+    text += "\nCoverage of 90 % intervals:\n\n| step | belief |";
+    NUMBERS.iter().for_each(|(name, _)| text += &format!(" {} |", name.replace('_', " ")));
+    text += &format!("\n|---|---|{}\n", "---|".repeat(NUMBERS.len()));
+    rows(summary, &mut text, |cells| {
+        NUMBERS.iter().map(|(name, _)| interval(&cells[format!("{name}_coverage_90")], 2)).collect()
+    });
+    text += "\n| P(obstacle) said | held | steps |\n|---|---|---|\n";
+    for bin in summary["reliability"].as_array().into_iter().flatten() {
+        text += &format!("| {} | {} | {} |\n", number(&bin["said"], 2), number(&bin["held"], 2), bin["steps"]);
+    }
+    text += &format!(
+        "\nSolved {}, discounted return {}. Transitions an update: {}; exponent of the bridge: {}; seconds an action on one thread: {}.\n\
+         Log score over the better of prior and network, steps after the first contact: {}. Histogram of the joint test (TARP): {}.\n",
+        interval(&summary["solved"], 2),
+        interval(&summary["discounted_return"], 1),
+        number(&summary["transitions_per_update"], 0),
+        number(&summary["exponent"], 2),
+        number(&summary["seconds_per_action"], 2),
+        number(&summary["log_score_over_the_better_of_prior_and_network_after_contact"], 2),
+        summary["tarp_histogram_at_the_last_step"]
+    );
+    text
+}
+
+fn rows(summary: &Value, text: &mut String, cells: impl Fn(&Value) -> Vec<String>) {
+    for step in STEPS {
+        let name = if step == usize::MAX { "last".to_string() } else { step.to_string() };
+        for (source, _) in SOURCES {
+            *text += &format!("| {name} | {source} | {} |\n", cells(&summary["steps"][&name][source]).join(" | "));
+        }
+    }
+}
+
+fn number(value: &Value, digits: usize) -> String {
+    value.as_f64().map_or("–".into(), |v| format!("{v:.digits$}"))
+}
+
+fn interval(value: &Value, digits: usize) -> String {
+    if value.is_null() {
+        return "–".into();
+    }
+    format!(
+        "{} ({} to {})",
+        number(&value["mean"], digits),
+        number(&value["low"], digits),
+        number(&value["high"], digits)
+    )
+}
