@@ -35,10 +35,14 @@ impl<'a> Estimate<'a> {
         Self { coordinates: history.start_coordinates().clone(), count: history.coordinates(), network: None }
     }
 
-    /// What a network says that has seen the history's latest observation.
+    /// What a network says that has seen the history's latest observation. The prior, where a number is known exactly: a network says nothing of
+    /// such a world, as it has seen none.
     #[must_use]
     pub fn network(history: &History<'a>, suggester: &Suggester) -> Self {
         let mut estimate = Self::prior(history);
+        if !estimate.coordinates.has_density() {
+            return estimate;
+        }
         let joint: [f64; CLASSES] = std::array::from_fn(|index| {
             let classes = pair(index);
             suggester.class_probability(classes) * estimate.class_ratio(suggester, classes)

@@ -55,6 +55,22 @@ fn start(history: &History<'_>, estimate: &Estimate<'_>, rng: &mut Rng) -> Optio
 }
 
 #[test]
+fn a_number_that_is_known_exactly_leaves_the_prior() {
+    let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let set = vec!["distribution.object.friction.stddev=0.0".into()];
+    let selection = Selection { domain: "D4".into(), set, ..Selection::new(&root) };
+    let problem = Problem::assemble(&selection.load().unwrap(), &root).unwrap();
+    let (history, network) = episode(&problem, 2, 0);
+    let estimate = Estimate::network(&history, &network);
+    let mut rng = Seed(44).stream(Purpose::Test, 0);
+    let starts: Vec<_> = (0..40).filter_map(|_| start(&history, &estimate, &mut rng)).collect();
+    assert!(starts.len() > 10, "{} of 40 are possible", starts.len());
+    for (start, _) in starts {
+        assert_eq!((start.theta.object.friction, estimate.log_ratio(&start)), (0.4, 0.0));
+    }
+}
+
+#[test]
 fn the_density_of_draws_is_normalised() {
     // E over q of p / q is the mass of p, whatever q is. p is the prior times the likelihood of the first measured height, as the network has
     // seen it: so the ratio varies little. The mass of p is found by draws of the prior. Draws that are no world count as 0 on both sides.

@@ -7,7 +7,7 @@
 
 use physics_model::config::ObstacleMobility;
 use physics_model::state::BodyState;
-use physics_model::theta::{ObjectShape, ObjectTheta, ObstacleTheta, Theta, standard_com_m};
+use physics_model::theta::{NO_OBSTACLE, ObjectShape, ObjectTheta, ObstacleTheta, Theta, standard_com_m};
 use statrs::distribution::{ContinuousCDF as _, Gamma, Normal};
 use statrs::function::gamma::ln_gamma;
 
@@ -147,6 +147,16 @@ impl Coordinates<'_> {
             };
         }
         total
+    }
+
+    /// Whether [`Self::log_density`] is a density: none of the numbers that it counts is known exactly.
+    #[must_use]
+    pub fn has_density(&self) -> bool {
+        let (d, b) = (&self.prior.object, &self.prior.obstacle);
+        let obstacle = b.shape[..NO_OBSTACLE].iter().any(|probability| *probability > 0.0);
+        let place = [&b.x_m, &b.y_m, &b.yaw_rad];
+        let of_obstacle = b.size_m.parts().chain(place).filter(|_| obstacle);
+        d.size_m.parts().chain([&d.friction]).chain(of_obstacle).all(|part| part.stddev > 0.0)
     }
 
     /// Coordinates of what [`Self::log_density`] counts, into `z`; the others stay. `None` outside the distribution.

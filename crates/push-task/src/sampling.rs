@@ -138,7 +138,7 @@ impl SizeDistribution {
         }
     }
 
-    fn parts(&self) -> impl Iterator<Item = &TruncatedNormal> {
+    pub(crate) fn parts(&self) -> impl Iterator<Item = &TruncatedNormal> {
         self.r#box.iter().chain(&self.cylinder).chain(&self.sphere)
     }
 }
