@@ -4,6 +4,7 @@ mod bridge;
 mod heuristic;
 mod oracle;
 mod rejection;
+mod searcher;
 
 use belief::Particles;
 use planner::SearchReport;
@@ -19,6 +20,7 @@ pub use bridge::history;
 use heuristic::HeuristicController;
 use oracle::OracleController;
 use rejection::RejectionController;
+use searcher::Searcher;
 
 pub(crate) use rejection::obstacle_share;
 #[cfg(test)]

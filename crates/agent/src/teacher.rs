@@ -3,8 +3,8 @@
 use physics_model::theta::{NO_OBSTACLE, ObjectShape};
 use pomdp::{Replay as _, Rng, Teacher};
 use prior::Suggester;
+use push_task::sampling::categorical;
 use push_task::{Coordinates, History, Particle};
-use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 
 /// Pairs of classes, of the object's shape and the obstacle.
@@ -68,9 +68,9 @@ impl Teacher<Particle> for Estimate<'_> {
         let table_m = self.coordinates.model().config().world.table_height_m;
         let Some(network) = &self.network else {
             let (shapes, obstacles) = self.coordinates.class_probabilities();
-            return Some((vec![class(shapes, rng), class(obstacles, rng)], z));
+            return Some((vec![categorical(shapes, rng), categorical(obstacles, rng)], z));
         };
-        let classes = pair(class(&network.classes, rng));
+        let classes = pair(categorical(&network.classes, rng));
         let draw = network.suggester.sample_raw_given(classes, table_m, rng)?;
         // Outside the limits of the domain there is no start. Another draw in its place would have another density.
         self.coordinates.invert(&draw, &mut z)?;
@@ -90,14 +90,4 @@ impl Teacher<Particle> for Estimate<'_> {
 /// The object's shape and the obstacle's class of a place among the pairs.
 fn pair(index: usize) -> [usize; 2] {
     [index / (NO_OBSTACLE + 1), index % (NO_OBSTACLE + 1)]
-}
-
-/// A class drawn from probabilities that sum to 1.
-fn class(probabilities: &[f64], rng: &mut Rng) -> usize {
-    let mut rest: f64 = rng.random();
-    let drawn = probabilities.iter().position(|probability| {
-        rest -= probability;
-        rest < 0.0
-    });
-    drawn.unwrap_or_else(|| probabilities.iter().rposition(|p| *p > 0.0).unwrap_or(0))
 }

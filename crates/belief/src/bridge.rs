@@ -7,7 +7,7 @@ use pomdp::{Replay, Rng, Teacher, UpdateReport};
 use crate::config::{MOST_PARTICLES, require};
 use crate::diagnostics::{log_effective_sample_size, log_sum_exp};
 use crate::parallel::each;
-use crate::resample_move::{Hypothesis, replay};
+use crate::resample_move::{Hypothesis, normal, replay};
 use crate::{Error, Particles};
 
 /// Draws from a teacher until one is possible.
@@ -162,38 +162,44 @@ impl<S: Clone + Send + Sync, T: Teacher<S>> BridgeFilter<S, T> {
 
     /// Draws from a teacher, and weighs all draws.
     fn take_in<R: Replay<State = S>>(&mut self, episode: &R, teacher: T, rng: &mut Rng) -> Result<UpdateReport, Error> {
+        let mut report = UpdateReport { transitions: self.draw(episode, teacher, rng), ..UpdateReport::default() };
+        self.weigh(&mut report)?;
+        Ok(report)
+    }
+
+    /// Draws from a teacher, replays what it drew, and asks it about all that is remembered. Returns the transitions that it took.
+    fn draw<R: Replay<State = S>>(&mut self, episode: &R, teacher: T, rng: &mut Rng) -> usize {
         let made = each(self.config.draws, rng, |_, rng| {
-            use rand_distr::Distribution as _;
             for attempts in 1..=ATTEMPTS {
                 let Some((classes, start)) = teacher.draw(rng) else { continue };
                 let Some((state, _)) = episode.start(&classes, &start) else { continue };
                 let count = episode.steps() * episode.step_coordinates();
-                let noise = (0..count).map(|_| rand_distr::StandardNormal.sample(rng)).collect();
+                let noise = (0..count).map(|_| normal(rng)).collect();
                 return (attempts, Some((state, replay(episode, (classes, start, noise), 1.0, f64::NEG_INFINITY))));
             }
             (ATTEMPTS, None)
         });
         // Impossible draws count: that they are replaced by possible ones makes the density of these larger by as much.
         let drawn = made.iter().map(|(attempts, _)| attempts).sum();
-        let mut report = UpdateReport::default();
-        let mut members = Vec::new();
+        let (mut transitions, mut members) = (0, Vec::new());
         for (start, replayed) in made.into_iter().filter_map(|(_, made)| made) {
-            report.transitions += replayed.transitions;
+            transitions += replayed.transitions;
             let Some(hypothesis) = replayed.hypothesis else { continue };
             let ratios = self.batches.iter().map(|batch| batch.teacher.log_ratio(&start)).collect();
             members.push(Member { hypothesis, start, ratios });
         }
+        for member in self.batches.iter_mut().flat_map(|batch| &mut batch.members).chain(&mut members) {
+            member.ratios.push_back(teacher.log_ratio(&member.start));
+        }
         self.batches.push_back(Batch { teacher, drawn, members });
+        transitions
+    }
+
+    /// Weighs all draws by the bridge from the latest teacher to the posterior.
+    fn weigh(&mut self, report: &mut UpdateReport) -> Result<(), Error> {
         let total: usize = self.batches.iter().map(|batch| batch.drawn).sum();
         let shares: Vec<f64> = self.batches.iter().map(|batch| (batch.drawn as f64 / total as f64).ln()).collect();
         let latest = self.batches.len() - 1;
-        for index in 0..=latest {
-            let mut members = std::mem::take(&mut self.batches[index].members);
-            for member in &mut members {
-                member.ratios.push_back(self.batches[latest].teacher.log_ratio(&member.start));
-            }
-            self.batches[index].members = members;
-        }
         let (mut base, mut gain, mut posterior) = (Vec::new(), Vec::new(), Vec::new());
         for member in self.members() {
             let mix = log_sum_exp(member.ratios.iter().zip(&shares).map(|(r, s)| r + s));
@@ -232,7 +238,7 @@ impl<S: Clone + Send + Sync, T: Teacher<S>> BridgeFilter<S, T> {
         let before =
             std::mem::replace(&mut self.log_evidence, log_sum_exp(posterior.into_iter()) - (total as f64).ln());
         report.log_evidence = if before.is_finite() { self.log_evidence - before } else { f64::NEG_INFINITY };
-        Ok(report)
+        Ok(())
     }
 }
 

@@ -7,4 +7,4 @@ mod moves;
 
 pub use config::ResampleMoveConfig;
 pub use filter::ResampleMoveFilter;
-pub(crate) use hypothesis::{Hypothesis, replay};
+pub(crate) use hypothesis::{Hypothesis, normal, replay};

@@ -11,7 +11,7 @@ use physics_model::theta::{NO_OBSTACLE, ObjectShape, ObjectTheta, ObstacleTheta,
 use statrs::distribution::{ContinuousCDF as _, Gamma, Normal};
 use statrs::function::gamma::ln_gamma;
 
-use crate::model::{Particle, PushModel};
+use crate::model::{Particle, PushModel, gaussian};
 use crate::sampling::{GammaMean, OBJECT_MASS_KG, OBSTACLE_MASS_KG, TruncatedNormal, WorldDistribution, separate};
 use crate::sampling::{SizeDistribution, effects};
 use crate::sensor::Observation;
@@ -115,8 +115,8 @@ impl<'a> Coordinates<'a> {
         self.model.displace(&mut particle);
         self.model.check(&particle).ok()?;
         let stddev = self.model.config().sensor.noise.position_m;
-        let error = (self.height_m - self.model.readings(&particle).object.position_m[2]) / stddev;
-        Some((particle, -0.5 * error * error - stddev.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln()))
+        let error_m = self.height_m - self.model.readings(&particle).object.position_m[2];
+        Some((particle, gaussian(error_m, stddev)))
     }
 }
 

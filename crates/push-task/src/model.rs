@@ -466,6 +466,6 @@ impl Perturb for PushModel {
 }
 
 /// ln of the density of N(0, stddev²) at `value`.
-fn gaussian(value: f64, stddev: f64) -> f64 {
+pub(crate) fn gaussian(value: f64, stddev: f64) -> f64 {
     -0.5 * (value / stddev).powi(2) - stddev.ln() - 0.5 * (2.0 * std::f64::consts::PI).ln()
 }

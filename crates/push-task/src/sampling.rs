@@ -320,7 +320,9 @@ pub(crate) fn separate(model: &PushModel, particle: &Particle) -> bool {
     model.check(&grown).is_ok()
 }
 
-fn categorical(weights: &[f64], rng: &mut Rng) -> usize {
+/// An index drawn with probabilities that sum to 1.
+#[must_use]
+pub fn categorical(weights: &[f64], rng: &mut Rng) -> usize {
     let mut u: f64 = rng.random();
     for (index, weight) in weights.iter().enumerate() {
         u -= weight;

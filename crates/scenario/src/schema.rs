@@ -100,17 +100,6 @@ pub struct BeliefConfig {
     pub bridge: belief::BridgeConfig,
 }
 
-impl BeliefConfig {
-    /// Particles of the first belief.
-    #[must_use]
-    pub fn particles(&self) -> usize {
-        match self.filter {
-            Filter::Rejection => self.rejection.particles,
-            Filter::Bridge => self.bridge.draws * self.bridge.kept,
-        }
-    }
-}
-
 impl Scenario {
     /// Names of the folders that hold a network for this scenario, the best one first. The bridge filter's are trained on worlds with the transition's
     /// noise and one mobility of the obstacle.

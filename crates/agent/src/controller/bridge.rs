@@ -1,27 +1,24 @@
 //! The method with a belief over whole histories: the network's estimate, and the exact likelihood as far as its draws carry it.
 
 use belief::{BridgeFilter, Particles};
-use planner::Pomcp;
-use pomdp::{Discretise as _, Prior as _, Purpose, Rng, Seed};
+use pomdp::{Prior as _, Purpose, Rng, Seed};
 use prior::Suggester;
-use push_task::{Action, Coordinates, History, Observation, Particle, PushModel};
+use push_task::{Action, Coordinates, History, Observation, Particle};
 use scenario::{InitialObstacle, Problem};
 
-use crate::controller::{Controller, Decision, Update, default_policy, obstacle_share};
+use crate::controller::{Controller, Decision, Searcher, Update, obstacle_share};
 use crate::record::End;
 use crate::{Error, Estimate, WorldStep};
 
 /// Searches from a belief over whole histories.
 pub(crate) struct BridgeController<'a> {
-    problem: &'a Problem,
-    search: Pomcp<PushModel>,
+    searcher: Searcher<'a>,
     history: History<'a>,
     filter: BridgeFilter<Particle, Estimate<'a>>,
     prior: Option<&'a mut Suggester>,
     /// `None` once it is out of particles.
     belief: Option<Particles<Particle>>,
-    search_rng: Rng,
-    filter_rng: Rng,
+    rng: Rng,
 }
 
 impl<'a> BridgeController<'a> {
@@ -38,13 +35,11 @@ impl<'a> BridgeController<'a> {
             network.suggest(None, first);
         }
         let history = history(problem, prior.as_deref(), first);
-        let mut filter_rng = seed.stream(Purpose::Filter, 0);
+        let mut rng = seed.stream(Purpose::Filter, 0);
         let estimate = estimate(&history, prior.as_deref());
-        let filter = BridgeFilter::new(problem.scenario.belief.bridge.clone(), &history, estimate, &mut filter_rng)?;
+        let filter = BridgeFilter::new(problem.scenario.belief.bridge.clone(), &history, estimate, &mut rng)?;
         let belief = Some(filter.belief()?);
-        let search = Pomcp::new(problem.scenario.planner.clone())?;
-        let search_rng = seed.stream(Purpose::Search, 0);
-        Ok(Self { problem, search, history, filter, prior, belief, search_rng, filter_rng })
+        Ok(Self { searcher: Searcher::new(problem, seed)?, history, filter, prior, belief, rng })
     }
 }
 
@@ -66,9 +61,7 @@ fn estimate<'a>(history: &History<'a>, prior: Option<&Suggester>) -> Estimate<'a
 impl Controller for BridgeController<'_> {
     fn decide(&mut self, _: Option<&Particle>, remaining: usize) -> Result<Decision, Error> {
         let belief = self.belief.as_ref().expect("an episode ends when it is out of particles");
-        let policy = default_policy(self.problem);
-        let report = self.search.search(&self.problem.model, belief, policy, remaining, &mut self.search_rng);
-        Ok(Decision { action: report.action, search: Some(report) })
+        Ok(self.searcher.decide(belief, remaining))
     }
 
     fn update(&mut self, action: Action, answer: &WorldStep) -> Result<Update, Error> {
@@ -77,7 +70,7 @@ impl Controller for BridgeController<'_> {
             network.suggest(Some(&action), &answer.observation);
         }
         let estimate = estimate(&self.history, self.prior.as_deref());
-        match self.filter.update(&self.history, estimate, &mut self.filter_rng) {
+        match self.filter.update(&self.history, estimate, &mut self.rng) {
             Ok(report) => {
                 let belief = self.filter.belief()?;
                 let obstacle_share = obstacle_share(&belief);
@@ -93,7 +86,7 @@ impl Controller for BridgeController<'_> {
     }
 
     fn prune(&mut self, action: Action, observation: &Observation) {
-        self.search.prune(&action, &self.problem.model.key(observation));
+        self.searcher.prune(action, observation);
     }
 
     fn belief(&self) -> Option<&Particles<Particle>> {

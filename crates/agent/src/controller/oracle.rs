@@ -1,26 +1,22 @@
 //! The upper bound: the same search, from the true state and parameters.
 
 use belief::Particles;
-use planner::Pomcp;
-use pomdp::{Discretise as _, Purpose, Rng, Seed};
-use push_task::{Action, Observation, Particle, PushModel};
+use pomdp::Seed;
+use push_task::{Action, Observation, Particle};
 use scenario::Problem;
 
-use crate::controller::{Controller, Decision, Update, default_policy};
+use crate::controller::{Controller, Decision, Searcher, Update};
 use crate::{Error, WorldStep};
 
 /// Searches from what is true.
 pub(crate) struct OracleController<'a> {
-    problem: &'a Problem,
-    search: Pomcp<PushModel>,
-    rng: Rng,
+    searcher: Searcher<'a>,
 }
 
 impl<'a> OracleController<'a> {
     /// Without a tree so far.
     pub(crate) fn new(problem: &'a Problem, seed: Seed) -> Result<Self, Error> {
-        let search = Pomcp::new(problem.scenario.planner.clone())?;
-        Ok(Self { problem, search, rng: seed.stream(Purpose::Search, 0) })
+        Ok(Self { searcher: Searcher::new(problem, seed)? })
     }
 }
 
@@ -28,9 +24,7 @@ impl Controller for OracleController<'_> {
     fn decide(&mut self, truth: Option<&Particle>, remaining: usize) -> Result<Decision, Error> {
         let truth = truth.ok_or(Error::NoTruth)?.clone();
         let belief = Particles::uniform(vec![truth])?;
-        let policy = default_policy(self.problem);
-        let report = self.search.search(&self.problem.model, &belief, policy, remaining, &mut self.rng);
-        Ok(Decision { action: report.action, search: Some(report) })
+        Ok(self.searcher.decide(&belief, remaining))
     }
 
     fn update(&mut self, _: Action, _: &WorldStep) -> Result<Update, Error> {
@@ -38,7 +32,7 @@ impl Controller for OracleController<'_> {
     }
 
     fn prune(&mut self, action: Action, observation: &Observation) {
-        self.search.prune(&action, &self.problem.model.key(observation));
+        self.searcher.prune(action, observation);
     }
 
     fn belief(&self) -> Option<&Particles<Particle>> {

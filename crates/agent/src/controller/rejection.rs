@@ -1,13 +1,12 @@
 //! The method of the paper: POMCP from a belief that a rejection filter keeps.
 
 use belief::{Particles, RejectionFilter};
-use planner::Pomcp;
-use pomdp::{Discretise as _, Proposals, Purpose, Rng, Seed, Updater as _};
+use pomdp::{Proposals, Purpose, Rng, Seed, Updater as _};
 use prior::Suggester;
-use push_task::{Action, Observation, Particle, PushModel};
+use push_task::{Action, Observation, Particle};
 use scenario::Problem;
 
-use crate::controller::{Controller, Decision, Update, default_policy};
+use crate::controller::{Controller, Decision, Searcher, Update};
 use crate::proposals::{Context, Proposer};
 use crate::record::End;
 use crate::{Error, Method, WorldStep};
@@ -15,7 +14,7 @@ use crate::{Error, Method, WorldStep};
 /// Searches from a belief, which the network helps to keep where the method has one.
 pub(crate) struct RejectionController<'a> {
     problem: &'a Problem,
-    search: Pomcp<PushModel>,
+    searcher: Searcher<'a>,
     /// `None` once it is out of particles.
     belief: Option<Particles<Particle>>,
     filter: RejectionFilter,
@@ -27,7 +26,6 @@ pub(crate) struct RejectionController<'a> {
 
 /// A random stream for each kind of draw.
 struct Streams {
-    search: Rng,
     filter: Rng,
     suggestion: Rng,
 }
@@ -43,16 +41,15 @@ impl<'a> RejectionController<'a> {
     ) -> Result<Self, Error> {
         let scenario = &problem.scenario;
         let mut rng = seed.stream(Purpose::InitialBelief, 0);
-        let particles = problem.initial_particles(scenario.belief.particles(), first, &mut rng)?;
+        let particles = problem.initial_particles(scenario.belief.rejection.particles, first, &mut rng)?;
         Ok(Self {
             problem,
-            search: Pomcp::new(scenario.planner.clone())?,
+            searcher: Searcher::new(problem, seed)?,
             belief: Some(Particles::uniform(particles)?),
             filter: RejectionFilter::new(scenario.belief.rejection.clone())?,
             proposer: prior.map(|prior| Proposer::new(problem, method, prior, first)),
             object_moved: false,
             streams: Streams {
-                search: seed.stream(Purpose::Search, 0),
                 filter: seed.stream(Purpose::Filter, 0),
                 suggestion: seed.stream(Purpose::Suggestion, 0),
             },
@@ -63,9 +60,7 @@ impl<'a> RejectionController<'a> {
 impl Controller for RejectionController<'_> {
     fn decide(&mut self, _: Option<&Particle>, remaining: usize) -> Result<Decision, Error> {
         let belief = self.belief.as_ref().expect("an episode ends when it is out of particles");
-        let policy = default_policy(self.problem);
-        let report = self.search.search(&self.problem.model, belief, policy, remaining, &mut self.streams.search);
-        Ok(Decision { action: report.action, search: Some(report) })
+        Ok(self.searcher.decide(belief, remaining))
     }
 
     fn update(&mut self, action: Action, answer: &WorldStep) -> Result<Update, Error> {
@@ -94,7 +89,7 @@ impl Controller for RejectionController<'_> {
     }
 
     fn prune(&mut self, action: Action, observation: &Observation) {
-        self.search.prune(&action, &self.problem.model.key(observation));
+        self.searcher.prune(action, observation);
     }
 
     fn belief(&self) -> Option<&Particles<Particle>> {
