@@ -60,7 +60,7 @@ pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, asked
 
 /// Whether a rival might convince beside a second effect that is missing: what that one does may well hit what was held out harder.
 pub(crate) fn may_convince(rival: &Rival, episodes: &Episodes, asked: Asked, seed: u64) -> bool {
-    rival.whole && rival.gain > asked.least && lasts(&rival.fit, &episodes.fitted, seed)
+    rival.whole && rival.gain.is_finite() && rival.gain > asked.least && lasts(&rival.fit, &episodes.fitted, seed)
 }
 
 /// Whether both effects of `second` convince together, beside the model that the first one was added to.
@@ -78,7 +78,7 @@ pub(crate) fn better_heldout(found: &[f64], other: &[f64], episodes: &Episodes) 
 /// Whether each effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
 /// resamples, as wide as the intervals that are reported; and it is no error of the engine.
 pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
-    let mut samples = bootstrap(fit, groups, seed);
+    let Some(mut samples) = bootstrap(fit, groups, seed) else { return false };
     widen(&mut samples, fit);
     let mut first = fit.model.tunables + fit.model.errors;
     !fit.model.parts.is_empty()
@@ -150,7 +150,7 @@ mod tests {
     /// A fit that leaves residuals of this size in each of four episodes.
     fn leaves(size: f64) -> Fit {
         let residuals = vec![DVector::from_element(20, size); 4];
-        Fit { model: Model::nominal(0, 0), x: Vec::new(), raw: Vec::new(), residuals, jacobian: Vec::new() }
+        Fit::new(Model::nominal(0, 0), Vec::new(), Vec::new(), residuals, Vec::new())
     }
 
     /// A round that finds `found` beside `base` in what was fitted, and as much in two held-out episodes.
@@ -204,8 +204,10 @@ mod tests {
         let pieces = |count: usize| (0..count).map(|place| place..place + 1).collect();
         let episodes = Episodes { fitted: pieces(4), heldout: pieces(2), counts: vec![20; 2] };
         let mut round = round(3.0, 3.0);
-        round.rivals[0].fit.residuals[0] = DVector::from_element(20, 0.5);
-        round.rivals[0].fit.residuals[1] = DVector::from_element(20, 2.5);
+        let mut residuals = leaves(3.0).residuals;
+        residuals[0] = DVector::from_element(20, 0.5);
+        residuals[1] = DVector::from_element(20, 2.5);
+        round.rivals[0].fit = Fit::new(Model::nominal(0, 0), Vec::new(), Vec::new(), residuals, Vec::new());
         // 42 of the 47 it gains are of one episode.
         let gain = round.rivals[0].fit.log_evidence() - round.base.log_evidence();
         round.rivals[0].gain = gain;

@@ -244,6 +244,13 @@ pub fn diagnose_watched(
     // where nothing explains much more.
     let study = Study::new(&simulator, engine, fitted);
     let (null, part, places) = null_model(&study);
+    let no_numbers = || {
+        let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
+        Error::Unfit { log: name.into(), reason }
+    };
+    if !null.log_evidence().is_finite() {
+        return Err(no_numbers());
+    }
     simulator.stage("screening the effects");
     let context = context(&study, &null, log, &noise);
     let screening = Screening::new(&part, places, &null, &candidates(&context));
@@ -260,9 +267,8 @@ pub fn diagnose_watched(
     simulator.stage("comparing held-out episodes, before and after");
     let null = rounds[0].base.clone();
     let heldout = [search.heldout(&null), search.heldout(&accepted)];
-    if !heldout.iter().flatten().all(|sum| sum.is_finite()) {
-        let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
-        return Err(Error::Unfit { log: name.into(), reason });
+    if !null.log_evidence().is_finite() || !heldout.iter().flatten().all(|sum| sum.is_finite()) {
+        return Err(no_numbers());
     }
     let heldout_episodes = by_episode(&heldout, &episodes, |place| trials[search.kept.chosen[place]].id);
     let fitted_mean = |group: &Range<usize>| mean_square(&accepted.residuals[group.clone()]);

@@ -174,7 +174,7 @@ impl Report {
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
         let count = diagnosis.heldout_counts.iter().sum::<usize>().max(1) as f64;
         let [before, after] = heldout_errors(diagnosis);
-        let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed);
+        let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed).unwrap_or_default();
         widen(&mut samples, &diagnosis.model);
         let mut effects = effects(diagnosis, &samples, settings);
         let verdict = diagnosis.verdict;

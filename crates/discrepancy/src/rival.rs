@@ -112,7 +112,7 @@ mod tests {
     fn rival(kind: EffectKind, gain: f64, left: f64) -> Rival {
         let candidate = candidates(&context()).into_iter().find(|candidate| candidate.kind() == kind).unwrap();
         let model = Model::nominal(0, 0).with(&candidate);
-        let fit = Fit { model, x: Vec::new(), raw: Vec::new(), residuals: Vec::new(), jacobian: Vec::new() };
+        let fit = Fit::new(model, Vec::new(), Vec::new(), Vec::new(), Vec::new());
         Rival { fit, whole: true, gain, heldout: vec![left] }
     }
 

@@ -88,7 +88,7 @@ impl Screening {
     /// screening alone.
     #[must_use]
     pub fn promises(&self, part: &Study, fit: &Fit, episodes: usize) -> Vec<Promise> {
-        let Fit { model, x, raw, residuals, jacobian: tuning } = fit;
+        let Fit { model, x, raw, residuals, jacobian: tuning, .. } = fit;
         let moved = |change: &Vec<Vec<f64>>| -> Stack {
             let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
             part.white(&raw.iter().zip(change).map(sum).collect::<Vec<_>>(), model.engine_errors(x))
