@@ -87,7 +87,7 @@ impl Search<'_> {
         let coordinates = model.simulated() + COORDINATES;
         let looked = KINDS * (coordinates + STEPS + 1) + part.simulations_to_learn();
         let fitted = (coordinates + STEPS + 1) * self.study.rollouts();
-        self.study.simulator.affords(looked * part.rollouts() + fitted + self.reserve)
+        self.study.affords(looked * part.rollouts() + fitted + self.reserve)
     }
 
     fn lasts_in(&self, fit: &Fit, study: &Study) -> bool {
@@ -134,7 +134,7 @@ impl Search<'_> {
     /// With care, if the budget suffices.
     fn effort(&self, model: &Model) -> Effort {
         let twice = 2 * (model.simulated() + STEPS + 1) * self.study.rollouts();
-        if self.study.simulator.affords(twice) { Effort::Full } else { Effort::Quick }
+        if self.study.affords(twice) { Effort::Full } else { Effort::Quick }
     }
 
     /// What a link compared, as if in all episodes.

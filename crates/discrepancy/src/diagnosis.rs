@@ -5,7 +5,8 @@ use std::ops::Range;
 use measured_log::Log;
 
 use crate::accept::Episodes;
-use crate::candidate::candidates;
+use crate::budget::Budget;
+use crate::candidate::{Candidate, Context, candidates};
 use crate::context::context;
 use crate::driven::driven;
 use crate::error::Error;
@@ -32,6 +33,9 @@ use crate::verdict::{comes_near, verdict};
 
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
+
+/// What the search leaves to the screening, in simulations of each of its episodes: about as many as the catalogue has strengths and places.
+const SCREENED: usize = 70;
 
 /// What the search may do.
 #[derive(Clone, Debug)]
@@ -231,13 +235,25 @@ pub fn diagnose_watched(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Diagnosis, Error> {
+    diagnose_among(log, name, nominal, settings, progress, &candidates)
+}
+
+/// The same with the candidates that `catalogue` makes of what is known of the log.
+fn diagnose_among(
+    log: &Log,
+    name: &str,
+    nominal: &Nominal,
+    settings: &Settings,
+    progress: &dyn Progress,
+    catalogue: &dyn Fn(&Context) -> Vec<Candidate>,
+) -> Result<Diagnosis, Error> {
     let log = &*driven(log, name, nominal)?;
     let noise = NoiseLevels::of_log(log);
     plausible::check(log, name, nominal, &noise, LEAST_FITTED)?;
     let Compared { trials, sides: [fitted, heldout], left_out } = trials(log, name, nominal, &noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
-    let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]).watched_by(progress);
+    let simulator = Simulator::new(nominal, &trials).watched_by(progress, settings.limit);
     simulator.stage("re-tuning the nominal model");
     let engine = nominal.engine();
     // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search to all episodes, with care
@@ -253,8 +269,12 @@ pub fn diagnose_watched(
     }
     simulator.stage("screening the effects");
     let context = context(&study, &null, log, &noise);
-    let screening = Screening::new(&part, places, &null, &candidates(&context));
-    let kept = Study::new(&simulator, engine, heldout);
+    // What was simulated so far depends on the log alone; what the screening takes, on the catalogue.
+    let before = simulator.rollouts() + SCREENED * part.rollouts();
+    let limits = [settings.rollouts, settings.most, settings.limit];
+    let budget = Budget::new(limits.map(|limit| limit.saturating_sub(before)));
+    let screening = Screening::new(&part, places, &null, &catalogue(&context));
+    let [study, kept, part] = [study, Study::new(&simulator, engine, heldout), part].map(|study| study.within(&budget));
     let mut search = Search { study, kept, part, settings, reserve: 0 };
 
     let episodes = Episodes {
@@ -378,3 +398,43 @@ fn trials(
 
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.
 const LEAST_FITTED: usize = 4;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::Report;
+
+    /// What a report says of a recorded log whose candidates `catalogue` changes, but for what it cost.
+    fn answer(set: &str, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
+        let folder =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs").join(set);
+        let log = measured_log::read(&folder).unwrap();
+        let nominal = Nominal::new(&log.header, crate::rig_tool(&log, None).unwrap()).unwrap();
+        let settings = Settings::default();
+        let made = |context: &Context| catalogue(candidates(context));
+        let diagnosis = diagnose_among(&log, set, &nominal, &settings, &(), &made).unwrap();
+        let mut report = serde_json::to_value(Report::new(&diagnosis, &settings, 0.0)).unwrap();
+        report.as_object_mut().unwrap().remove("rollouts");
+        report
+    }
+
+    #[test]
+    fn what_else_the_catalogue_has_and_in_which_order_changes_no_answer() {
+        for set in ["set-003", "set-011"] {
+            let plain = answer(set, |all| all);
+            let reversed = |mut all: Vec<Candidate>| {
+                all.reverse();
+                all
+            };
+            assert_eq!(answer(set, reversed), plain, "{set}, reversed");
+            // Of one kind one is fitted, however many there are.
+            let more = |mut all: Vec<Candidate>| {
+                let leak =
+                    all.iter().find(|candidate| candidate.kind() == physics_model::EffectKind::MassLeak).cloned();
+                all.extend(std::iter::repeat_n(leak, 20).flatten());
+                all
+            };
+            assert_eq!(answer(set, more), plain, "{set}, more");
+        }
+    }
+}

@@ -126,7 +126,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
     let mut before = f64::INFINITY;
     for round in 0..rounds {
         let now = cost(&x, &residuals);
-        if round > 0 && (study.simulator.exhausted() || (round > 1 && before - now < LITTLE * now)) {
+        if round > 0 && (!study.has_fits() || (round > 1 && before - now < LITTLE * now)) {
             break;
         }
         before = now;
@@ -138,7 +138,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         let mut moved = false;
         for _ in 0..STEPS {
             // What everything else is compared with is fitted whatever it costs.
-            if !model.parts.is_empty() && !study.simulator.affords(simulation) {
+            if !model.parts.is_empty() && !study.affords(simulation) {
                 break;
             }
             let Some(step) = step(&model, &x, &residuals, &jacobian, damping) else { break };
@@ -169,7 +169,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
     }
     // Nearer than a finite difference reaches, Broyden's is as good as another.
     let near = fresh.is_some_and(|fresh| fresh.iter().zip(&x).all(|(a, b)| (a - b).abs() < NEAR * STEP));
-    if effort == Effort::Full && !near && study.simulator.affords(model.simulated() * simulation) {
+    if effort == Effort::Full && !near && study.affords(model.simulated() * simulation) {
         jacobian = derivatives(study, &model, &x, (&raw, &residuals));
     }
     Fit::new(model, x, raw, residuals, jacobian)

@@ -34,6 +34,7 @@
 
 mod accept;
 mod begin;
+pub mod budget;
 pub mod candidate;
 mod chain;
 mod context;

@@ -64,7 +64,7 @@ impl Search<'_> {
     ) -> (Fit, Vec<Round>, Option<Vec<Cell>>) {
         let settings = self.settings;
         let (mut accepted, mut rounds, mut explained, mut remaining) = (null.clone(), Vec::new(), 0.0, None);
-        let within = |search: &Self| search.study.simulator.rollouts() <= settings.rollouts;
+        let within = |search: &Self| search.study.has_rounds();
         let mut links = if settings.effects > 2 { self.chain(screening, null) } else { Vec::new() };
         if let Some((accepted, rounds)) = self.together(screening, null, &links, episodes) {
             return (accepted, rounds, None);
@@ -139,7 +139,7 @@ impl Search<'_> {
     fn both(&mut self, screening: &Screening, round: &mut Round, episodes: &Episodes) -> Option<Round> {
         let (asked, seed) = (self.asked(0.0), self.settings.seed);
         let first = round.rivals.iter().position(|rival| may_convince(rival, episodes, asked, seed))?;
-        if self.settings.effects < 2 || self.study.simulator.rollouts() > self.settings.rollouts {
+        if self.settings.effects < 2 || !self.study.has_rounds() {
             return None;
         }
         let Rival { fit, gain, .. } = round.rivals[first].clone();
@@ -230,17 +230,18 @@ impl Search<'_> {
 
     /// Whether a quick fit of a model to the episodes of a study is within the budget.
     pub(crate) fn affords(&self, study: &Study, model: &Model) -> bool {
-        self.study.simulator.affords((model.simulated() + STEPS + 1) * study.rollouts())
+        self.study.affords((model.simulated() + STEPS + 1) * study.rollouts())
     }
 
     /// Whether it is, and after it one to all episodes.
     fn affords_both(&self, part: &Study, model: &Model) -> bool {
         let rollouts = part.rollouts() + self.study.rollouts();
-        self.study.simulator.affords((model.simulated() + STEPS + 1) * rollouts + self.reserve)
+        self.study.affords((model.simulated() + STEPS + 1) * rollouts + self.reserve)
     }
 
     /// What a model leaves, by channel and phase.
     fn left(&self, fit: &Fit) -> Vec<Cell> {
+        self.study.charge();
         locate(self.study.simulator, &self.study.chosen, fit, self.settings.seed)
     }
 
@@ -307,7 +308,7 @@ impl Search<'_> {
             .map(|(rank, quick)| {
                 // Those far behind need no exact optimum: what they gain in the episodes of the screening they gain in all.
                 let gain = quick.log_evidence();
-                let affordable = !alone && self.study.simulator.rollouts() < self.settings.rollouts;
+                let affordable = !alone && self.study.has_rounds();
                 // Whether a body in the way moves is seen where it is met, which may be in few episodes.
                 let near = lead - gain < NEAR || added_kind(&quick) == first_kind;
                 if rank == 0 || (near && affordable) {

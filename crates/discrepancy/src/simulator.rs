@@ -48,8 +48,8 @@ pub struct Simulator<'a> {
     /// The episodes.
     pub trials: &'a [Trial],
     simulated: AtomicUsize,
-    /// Simulated episodes after which fits end where they are, and which none of their simulations exceeds.
-    budget: [usize; 2],
+    /// Simulated episodes that all stages may come to, for those who wait.
+    limit: usize,
     progress: &'a dyn Progress,
 }
 
@@ -57,37 +57,19 @@ impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, simulated: AtomicUsize::new(0), budget: [usize::MAX; 2], progress: &() }
+        Self { nominal, trials, simulated: AtomicUsize::new(0), limit: usize::MAX, progress: &() }
     }
 
-    /// With a number of simulated episodes after which fits end where they are, and one that they never exceed.
+    /// Before the eyes of somebody who wants to know how far it is, of so many simulated episodes at most.
     #[must_use]
-    pub fn with_budget(self, budget: [usize; 2]) -> Self {
-        Self { budget, ..self }
-    }
-
-    /// Before the eyes of somebody who wants to know how far it is.
-    #[must_use]
-    pub fn watched_by(self, progress: &'a dyn Progress) -> Self {
-        Self { progress, ..self }
+    pub fn watched_by(self, progress: &'a dyn Progress, limit: usize) -> Self {
+        Self { progress, limit, ..self }
     }
 
     /// Says what begins.
     pub(crate) fn stage(&self, stage: &'static str) {
-        self.progress.simulated(self.rollouts(), self.budget[1]);
+        self.progress.simulated(self.rollouts(), self.limit);
         self.progress.stage(stage);
-    }
-
-    /// Whether the budget is used up.
-    #[must_use]
-    pub fn exhausted(&self) -> bool {
-        self.rollouts() >= self.budget[0]
-    }
-
-    /// Whether so many more simulated episodes are within the budget.
-    #[must_use]
-    pub fn affords(&self, count: usize) -> bool {
-        self.rollouts() + count <= self.budget[1]
     }
 
     /// Episodes simulated so far; pieces of one count in proportion to their durations.
@@ -118,7 +100,7 @@ impl<'a> Simulator<'a> {
         trial: &Trial,
     ) -> (RigReading, Vec<RigReading>) {
         self.simulated.fetch_add(trial.share, Ordering::Relaxed);
-        self.progress.simulated(self.rollouts(), self.budget[1]);
+        self.progress.simulated(self.rollouts(), self.limit);
         let configs = || self.nominal.effects.iter().chain(&hypothesis.effects);
         let bounces = configs().any(|effect| effect.kind() == EffectKind::Restitution) && self.nominal.has_tool();
         let engine = &Engine { refinement: engine.refinement * if bounces { BOUNCE_REFINEMENT } else { 1 }, ..*engine };

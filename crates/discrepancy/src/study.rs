@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DVector;
 
+use crate::budget::Budget;
 use crate::likelihood::{Stack, pick};
 use crate::nominal::Engine;
 use crate::simulator::{Hypothesis, Nudge, Simulator};
@@ -19,6 +20,8 @@ pub struct Study<'a> {
     pub engine: Engine,
     /// Indices of the episodes.
     pub chosen: Vec<usize>,
+    /// What its simulations are taken from; `None`: they cost nothing.
+    budget: Option<&'a Budget>,
     whiteners: Vec<Whitener>,
     /// What an error of the engine of size one does to the residuals of each episode, one for each of the variants.
     engine_errors: Vec<Stack>,
@@ -61,12 +64,41 @@ impl<'a> Study<'a> {
     pub fn new(simulator: &'a Simulator<'a>, engine: Engine, chosen: Vec<usize>) -> Self {
         let plain = |index: &usize| Whitener::new(simulator.trials[*index].blocks.len(), &[]);
         let whiteners = chosen.iter().map(plain).collect();
-        Self { simulator, engine, chosen, whiteners, engine_errors: Vec::new() }
+        Self { simulator, engine, chosen, budget: None, whiteners, engine_errors: Vec::new() }
+    }
+
+    /// The same with simulations that are taken from a budget.
+    #[must_use]
+    pub fn within(self, budget: &'a Budget) -> Self {
+        Self { budget: Some(budget), ..self }
+    }
+
+    /// Whether so many more simulated episodes are within its budget.
+    pub(crate) fn affords(&self, count: usize) -> bool {
+        self.budget.is_none_or(|budget| budget.affords(count))
+    }
+
+    /// Whether its budget lets fits go on.
+    pub(crate) fn has_fits(&self) -> bool {
+        self.budget.is_none_or(Budget::has_fits)
+    }
+
+    /// Whether its budget lets a further effect be looked for.
+    pub(crate) fn has_rounds(&self) -> bool {
+        self.budget.is_none_or(Budget::has_rounds)
+    }
+
+    /// Takes a simulation of all its episodes from its budget.
+    pub(crate) fn charge(&self) {
+        if let Some(budget) = self.budget {
+            self.chosen.iter().for_each(|index| budget.take(self.simulator.trials[*index].share));
+        }
     }
 
     /// Residuals of all its episodes, standardised but not white.
     #[must_use]
     pub fn raw(&self, hypothesis: &Hypothesis) -> Vec<Vec<f64>> {
+        self.charge();
         self.simulator.residuals(hypothesis, &self.engine, Nudge::default(), &self.chosen)
     }
 
@@ -97,6 +129,7 @@ impl<'a> Study<'a> {
         Self {
             simulator: self.simulator,
             engine: self.engine,
+            budget: self.budget,
             chosen: places.iter().map(|place| self.chosen[*place]).collect(),
             whiteners: places.iter().map(|place| self.whiteners[*place].clone()).collect(),
             engine_errors: self.engine_errors.iter().map(|error| pick(error, places)).collect(),
@@ -105,7 +138,10 @@ impl<'a> Study<'a> {
 
     /// Learns from simulations near `hypothesis` how large errors that last may be: those of the solver, and of the start.
     pub fn learn_errors(&mut self, hypothesis: &Hypothesis) {
-        let simulate = |engine: &Engine, nudge| self.simulator.residuals(hypothesis, engine, nudge, &self.chosen);
+        let simulate = |engine: &Engine, nudge| {
+            self.charge();
+            self.simulator.residuals(hypothesis, engine, nudge, &self.chosen)
+        };
         let plain = simulate(&self.engine, Nudge::default());
         let change = |engine: &Engine, nudge, scale: f64| -> Stack {
             let changed = simulate(engine, nudge);
