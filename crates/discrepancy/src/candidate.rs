@@ -4,11 +4,14 @@
 //! stiffnesses and limits). Units are such that N(0, 1) covers what is plausible: the prior of a fit.
 
 use physics_model::config::WorldConfig;
-use physics_model::effect::parameter::{Parameter, Scale};
 use physics_model::effect::{EffectConfig, EffectKind};
 use physics_model::{ObjectShape, Theta};
 
 use crate::obstacle::Place;
+
+mod coordinate;
+
+use coordinate::coordinates;
 
 /// Of the distance from the neutral to the farthest plausible value: one standard deviation of the prior of a strength.
 const STRENGTH_SHARE: f64 = 1.0 / 1.5;
@@ -33,9 +36,8 @@ const CLIPS: [f64; 4] = [1.0, 0.85, 0.7, 0.58];
 const BOUNCES: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
 /// Places of a patch that are tried.
 const PATCHES: usize = 6;
-/// Standard deviation of where something is, m, around the place that a fit begins from.
-const PLACE_M: f64 = 0.05;
-/// The same of a body in the way, which is seen to within a few millimetres; its radius is known twice as well.
+/// Standard deviation of where a body in the way is, m, around the place that a fit begins from: it is seen to within a few millimetres. Its radius is known
+/// twice as well.
 const OBSTACLE_M: f64 = 0.01;
 
 /// What is known of the log before any effect is tried.
@@ -53,6 +55,10 @@ pub struct Context {
     pub patches_m: Vec<Place>,
     /// Largest force that was read, N; 0 without a sensor.
     pub largest_force_n: f64,
+    /// The same of all but one in a hundred readings.
+    pub usual_force_n: f64,
+    /// Speed of the object, m/s, of all but one in twenty tenths of a second.
+    pub usual_speed_mps: f64,
     /// Whether there is a tool that is commanded.
     pub tool: bool,
     /// Whether the object is an outline that was extruded.
@@ -290,67 +296,6 @@ fn obstacles(context: &Context) -> Vec<Candidate> {
     context.obstacles_m.iter().flat_map(bodies).map(candidate).collect()
 }
 
-fn coordinates(base: &EffectConfig, context: &Context) -> Vec<Coordinate> {
-    let kind = base.kind();
-    let values = base.values();
-    kind.parameters()
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| !left_alone(kind, *index, context))
-        .map(|(index, parameter)| coordinate(kind, index, parameter, values[index], context))
-        .collect()
-}
-
-/// What no log of this kind can say.
-fn left_alone(kind: EffectKind, index: usize, context: &Context) -> bool {
-    match kind {
-        // Where a payload's centre is shows in torques alone.
-        EffectKind::WristPayload => index > 0 && !(context.wrist_torques || context.joint_torques),
-        EffectKind::ContactCompliance => index == 1,
-        // What is pushed stays upright, where the height of its centre hardly shows; of a sphere it does, which stays where it is in the table's frame.
-        EffectKind::ComOffset => index == 2 && context.tool && context.theta.object.shape != ObjectShape::Sphere,
-        _ => false,
-    }
-}
-
-fn coordinate(kind: EffectKind, index: usize, parameter: &Parameter, value: f64, context: &Context) -> Coordinate {
-    let scale = parameter.scale;
-    let origin = scale.coordinate(value);
-    if !parameter.is_strength() {
-        let unit = match (kind, parameter.unit) {
-            (EffectKind::Tether, _) => 0.1,
-            (EffectKind::WristPayload, _) => 0.04,
-            (_, "m") if parameter.name.ends_with("radius_m") => 0.02,
-            (_, "m") => PLACE_M,
-            (_, "rad") => 0.4,
-            (_, "m/s") => 0.02,
-            _ => 0.5 * (parameter.plausible[1] - parameter.plausible[0]).abs(),
-        };
-        let ends = parameter.limits.map(|limit| (limit - origin) / unit);
-        return Coordinate { index, origin, unit, range: [ends[0].max(-5.0), ends[1].min(5.0)], strength: false };
-    }
-    let [low, high] = if kind == EffectKind::ForceSaturation {
-        // What was never reached clips nothing.
-        [0.3 * context.largest_force_n.max(0.1), f64::INFINITY]
-    } else {
-        parameter.plausible
-    };
-    let [a, b] = [scale.coordinate(low), scale.coordinate(high)];
-    let farthest = if (a - origin).abs() > (b - origin).abs() { a } else { b };
-    let unit = STRENGTH_SHARE * (farthest - origin).abs().max(1e-9);
-    // One that is plausible on one side alone is looked for there.
-    let (least, most) = (a.min(b), a.max(b));
-    let tolerance = 1e-9 * unit;
-    let below = if least < origin - tolerance { -4.0 } else { 0.0 };
-    let above = if most > origin + tolerance { 4.0 } else { 0.0 };
-    let [from, to] = match scale {
-        Scale::Linear => parameter.limits,
-        Scale::Reciprocal => [0.0, scale.coordinate(parameter.limits[0])],
-    };
-    let range = [((from - origin) / unit).max(below), ((to - origin) / unit).min(above)];
-    Coordinate { index, origin, unit, range, strength: true }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -381,6 +326,8 @@ pub(crate) mod tests {
             obstacles_m: vec![([0.5, 0.1], 0.03)],
             patches_m: vec![([0.4, 0.1], 0.09)],
             largest_force_n: 10.0,
+            usual_force_n: 10.0,
+            usual_speed_mps: 0.2,
             tool: true,
             outline: false,
             forces: true,

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use measured_log::Log;
+use physics_model::EffectConfig;
 
 use crate::accept::Episodes;
 use crate::budget::Budget;
@@ -29,6 +30,7 @@ use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
 use crate::touch::{ContactGap, contact_gap};
 use crate::trial::{Trial, groups};
+use crate::units::Units;
 use crate::verdict::{comes_near, verdict};
 
 /// A log of so many episodes may take the whole budget.
@@ -165,8 +167,10 @@ pub struct Diagnosis {
     pub effects_in_model: Vec<&'static str>,
     /// Mean squares of all episodes under the accepted model.
     pub mean_squares: Vec<f64>,
-    /// What re-tuning may change.
+    /// What re-tuning may change, in units of the log.
     pub tunables: Vec<Tunable>,
+    /// Those that everything else is in but plots and what is said of an unknown gap.
+    pub(crate) units: Units,
     /// Where the re-tuned nominal model disagrees.
     pub located: Vec<Cell>,
     /// Where the accepted model still does.
@@ -188,13 +192,18 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
+    /// The effects of the accepted model at coordinates `x`, in units of the log.
+    pub(crate) fn effects(&self, x: &[f64]) -> Vec<EffectConfig> {
+        self.model.model.hypothesis(x).effects.iter().map(|effect| self.units.effect(effect)).collect()
+    }
+
     /// Says what it is, and of a gap that nothing explains what it follows.
     fn judge(&mut self, study: &Study, settings: &Settings) {
         (self.verdict, self.reason) = verdict(self, settings);
         if self.verdict == Verdict::Unknown {
             let worst = worst(study.simulator, &study.chosen, &self.nominal);
-            self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst);
-            self.contact_gap = contact_gap(&worst);
+            self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst, &self.units);
+            self.contact_gap = contact_gap(&worst).map(|gap| gap.in_units(&self.units));
             if !self.model.model.parts.is_empty() && !comes_near(self) {
                 self.without_effects();
             }
@@ -248,8 +257,11 @@ fn diagnose_among(
     catalogue: &dyn Fn(&Context) -> Vec<Candidate>,
 ) -> Result<Diagnosis, Error> {
     let log = &*driven(log, name, nominal)?;
+    let units = Units::of(log);
+    let (log, tunables) = (&*units.inverse().log(log), nominal.tunables.clone());
+    let nominal = &nominal.in_units(&units.inverse())?;
     let noise = NoiseLevels::of_log(log);
-    plausible::check(log, name, nominal, &noise, LEAST_FITTED)?;
+    plausible::check(log, name, nominal, (&noise, &units), LEAST_FITTED)?;
     let Compared { trials, sides: [fitted, heldout], left_out } = trials(log, name, nominal, &noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
@@ -304,7 +316,7 @@ fn diagnose_among(
     let mut diagnosis = Diagnosis {
         located,
         remaining,
-        evidence: Evidence::new(&search.kept, &null, &accepted),
+        evidence: Evidence::new(&search.kept, &null, &accepted).in_units(&units),
         nominal: null,
         model: accepted,
         rounds,
@@ -315,7 +327,8 @@ fn diagnose_among(
         verdict: Verdict::None,
         reason: None,
         effects_in_model: nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
-        tunables: nominal.tunables.clone(),
+        tunables,
+        units,
         lacking_force: None,
         contact_gap: None,
         rollouts: 0,

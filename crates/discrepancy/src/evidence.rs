@@ -10,6 +10,7 @@ use crate::likelihood::Stack;
 use crate::simulator::Nudge;
 use crate::study::Study;
 use crate::trial::{Compared, Kind, Trial};
+use crate::units::Units;
 
 /// Points of a course, at most.
 const POINTS: usize = 80;
@@ -106,6 +107,29 @@ impl Evidence {
         for error in &mut self.errors {
             (error.after, error.median_after) = (error.before, error.median_before);
         }
+    }
+
+    /// In units of which `units` says how much one of today's is.
+    pub(crate) fn in_units(mut self, units: &Units) -> Self {
+        let scale = |values: &mut Vec<f64>, factor: f64| {
+            values.iter_mut().filter(|_| factor != 1.0).for_each(|value| *value = rounded(factor * *value));
+        };
+        let length = units.factor("m");
+        for path in [&mut self.path.measured, &mut self.path.before, &mut self.path.after] {
+            path.iter_mut().flatten().filter(|_| length != 1.0).for_each(|value| *value = rounded(length * *value));
+        }
+        if let Some(course) = &mut self.course {
+            let factor = units.factor(course.channel.unit());
+            [&mut course.measured, &mut course.before, &mut course.after]
+                .into_iter()
+                .for_each(|all| scale(all, factor));
+        }
+        for error in &mut self.errors {
+            let factor = units.factor(error.unit);
+            let sizes = [&mut error.before, &mut error.after, &mut error.median_before, &mut error.median_after];
+            sizes.into_iter().for_each(|size| *size *= factor);
+        }
+        self
     }
 
     /// Of the held-out episodes.

@@ -68,6 +68,7 @@ pub mod study;
 pub mod terms;
 pub mod touch;
 pub mod trial;
+mod units;
 mod verdict;
 pub mod whitener;
 

@@ -11,6 +11,7 @@ use physics_model::rig::{Prism, Rig, RigObject, RigShape, RigTool};
 use physics_model::{EffectConfig, ObjectShape};
 
 use crate::error::Error;
+use crate::units::Units;
 
 /// Engine step, s, at most.
 const LONGEST_STEP_SECS: f64 = 1.0 / 60.0;
@@ -104,6 +105,17 @@ enum Place {
     Restitution,
 }
 
+impl Place {
+    fn unit(self) -> &'static str {
+        match self {
+            Self::TableFriction | Self::ToolFriction | Self::Restitution => "",
+            Self::TableHeight | Self::Com(_) | Self::Size(_) => "m",
+            Self::Mass => "kg",
+            Self::Inertia(_) => "kg·m²",
+        }
+    }
+}
+
 /// The nominal model.
 #[derive(Clone, Debug)]
 pub struct Nominal {
@@ -132,6 +144,20 @@ impl Nominal {
         };
         let mut nominal = Self { header: header.clone(), tool, prism, tunables: Vec::new(), effects: Vec::new() };
         nominal.tunables = nominal.uncertain();
+        Ok(nominal)
+    }
+
+    /// The same in other units, of which `units` says how much one of today's is.
+    pub(crate) fn in_units(&self, units: &Units) -> Result<Self, Error> {
+        let tool = match &self.tool {
+            RigTool::Ball { radius_m } => RigTool::Ball { radius_m: units.factor("m") * radius_m },
+            tool => tool.clone(),
+        };
+        let mut nominal = Self::new(&units.header(&self.header), tool)?;
+        for (scaled, tunable) in nominal.tunables.iter_mut().zip(&self.tunables) {
+            scaled.mean = units.factor(tunable.place.unit()) * tunable.mean;
+        }
+        nominal.effects = self.effects.iter().map(|effect| units.effect(effect)).collect();
         Ok(nominal)
     }
 

@@ -229,8 +229,8 @@ impl Report {
 
 fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> Vec<NamedEffect> {
     let model = &diagnosis.model.model;
-    let fitted = model.hypothesis(&diagnosis.model.x).effects;
-    let resampled: Vec<_> = samples.iter().map(|x| model.hypothesis(x).effects).collect();
+    let fitted = diagnosis.effects(&diagnosis.model.x);
+    let resampled: Vec<_> = samples.iter().map(|x| diagnosis.effects(x)).collect();
     let mut explained = 0.0;
     (model.parts.iter().enumerate())
         .map(|(place, part)| {

@@ -163,7 +163,14 @@ impl Trial {
             let start = start::start(&part, noise);
             let whole = start.and_then(|start| Self::begun(log, &part, noise, has_tool, start));
             let weight = (0..episode.rows()).find_map(|row| episode.get(Channel::AddedMass, row));
-            return whole.map(|whole| Self { added_mass_kg: weight.unwrap_or(0.0), ..whole }).into_iter().collect();
+            // A clock may start anywhere.
+            let zero_secs = episode.time_secs.first().copied().unwrap_or(0.0);
+            let of_episode = |whole: Self| Self {
+                added_mass_kg: weight.unwrap_or(0.0),
+                begin_secs: if has_tool { whole.begin_secs - zero_secs } else { 0.0 },
+                ..whole
+            };
+            return whole.map(of_episode).into_iter().collect();
         }
         shared(pieces)
     }

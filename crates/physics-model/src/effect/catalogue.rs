@@ -179,6 +179,16 @@ impl EffectConfig {
         Ok(effect)
     }
 
+    /// The same in other units: each continuous value times the factor of its parameter, unchecked.
+    #[must_use]
+    pub fn scaled(&self, factor: impl Fn(&Parameter) -> f64) -> Self {
+        let scaled =
+            self.kind().parameters().iter().zip(self.values()).map(|(parameter, value)| factor(parameter) * value);
+        let mut effect = self.clone();
+        effect.set_values(&scaled.collect::<Vec<f64>>());
+        effect
+    }
+
     /// Sets one continuous value, unchecked.
     pub(crate) fn set_value(&mut self, index: usize, value: f64) {
         let mut values = self.values();
