@@ -8,7 +8,7 @@
 use crate::accept::{Episodes, convinces, lasts};
 use crate::fit::{Begin, Effort, Fit, STEPS, fit};
 use crate::model::Model;
-use crate::rival::{Rival, Round, first_of_each};
+use crate::rival::{Heldout, Rival, Round, first_of_each};
 use crate::screen::{Promise, Screening};
 use crate::search::{Search, added_kind};
 use crate::study::Study;
@@ -144,7 +144,7 @@ impl Search<'_> {
         let rival = |fit: &Fit| Rival {
             gain: share * (fit.log_evidence() - link.base.log_evidence()),
             // Nothing is decided by those of further effects.
-            heldout: if first { self.heldout(fit) } else { Vec::new() },
+            heldout: if first { self.heldout(fit) } else { Heldout::default() },
             fit: fit.clone(),
             whole: false,
         };

@@ -12,6 +12,7 @@ use crate::context::context;
 use crate::driven::driven;
 use crate::error::Error;
 use crate::evidence::Evidence;
+use crate::findings::Findings;
 use crate::fit::{Begin, Effort, Fit, fit};
 use crate::likelihood::mean_square;
 use crate::locate::{Cell, locate};
@@ -159,6 +160,8 @@ pub struct Diagnosis {
     pub heldout_counts: Vec<usize>,
     /// Of each held-out episode: number in the log, mean squares of nominal and accepted model.
     pub heldout_episodes: Vec<(u64, f64, f64)>,
+    /// What speaks for the first rival of each round.
+    pub findings: Vec<Findings>,
     /// The verdict.
     pub verdict: Verdict,
     /// Why it is `unknown`.
@@ -298,7 +301,12 @@ fn diagnose_among(
     let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
     simulator.stage("comparing held-out episodes, before and after");
     let null = rounds[0].base.clone();
-    let heldout = [search.heldout(&null), search.heldout(&accepted)];
+    let heldout = [&null, &accepted].map(|fit| search.heldout(fit).squares);
+    let lead = |round: &Round| {
+        let lead = round.rivals.first().filter(|rival| !rival.heldout.costs.is_empty())?;
+        Some(Findings::of(&search, round, lead, &episodes))
+    };
+    let findings = rounds.iter().filter_map(lead).collect();
     if !null.log_evidence().is_finite() || !heldout.iter().flatten().all(|sum| sum.is_finite()) {
         return Err(no_numbers());
     }
@@ -323,6 +331,7 @@ fn diagnose_among(
         heldout,
         heldout_counts: episodes.counts,
         heldout_episodes,
+        findings,
         mean_squares,
         verdict: Verdict::None,
         reason: None,

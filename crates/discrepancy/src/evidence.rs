@@ -224,7 +224,7 @@ fn errors(trials: &[&Trial], raw: &[Vec<Vec<f64>>; 2]) -> Vec<ChannelError> {
 /// Σ r(t) r(t + lag) over Σ r², each channel of each episode by itself.
 fn autocorrelation(trials: &[&Trial], stack: &Stack, lag: usize) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
-    for (trial, residuals) in trials.iter().zip(stack) {
+    for (trial, residuals) in trials.iter().zip(stack.iter()) {
         let finite = |place: usize| Some(residuals[place]).filter(|value: &f64| value.is_finite()).unwrap_or(0.0);
         for (place, block) in trial.blocks.iter().enumerate() {
             squares += finite(place).powi(2);

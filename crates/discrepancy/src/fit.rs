@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_fit_whose_derivatives_are_no_numbers_has_no_evidence() {
-        let stack = |size: f64| vec![DVector::from_element(20, size); 3];
+        let stack = |size: f64| Stack::from(vec![DVector::from_element(20, size); 3]);
         let evidence = |residuals: Stack, jacobian: Stack| {
             Fit::new(Model::nominal(1, 0), vec![0.5], Vec::new(), residuals, vec![jacobian]).log_evidence()
         };

@@ -12,7 +12,7 @@ use pomdp::{Purpose, Seed};
 use rand_distr::{Distribution as _, StandardNormal, Uniform};
 
 use crate::fit::Fit;
-use crate::likelihood::weights;
+use crate::likelihood::{product, weights};
 
 /// Resamples.
 const RESAMPLES: usize = 500;
@@ -27,13 +27,13 @@ pub fn bootstrap(fit: &Fit, groups: &[Range<usize>], seed: u64) -> Option<Vec<Ve
     }
     let weights = weights(&fit.residuals);
     let column = |i: usize, t: usize| &fit.jacobian[i][t];
-    let sum = |group: &Range<usize>, of: &dyn Fn(usize) -> f64| group.clone().map(|t| weights[t] * of(t)).sum::<f64>();
+    let sum = |group: &Range<usize>, of: &dyn Fn(usize) -> f64| group.clone().map(of).sum::<f64>();
     let grams: Vec<DMatrix<f64>> = (groups.iter())
-        .map(|group| DMatrix::from_fn(n, n, |i, j| sum(group, &|t| column(i, t).dot(column(j, t)))))
+        .map(|group| DMatrix::from_fn(n, n, |i, j| sum(group, &|t| product(column(i, t), column(j, t), &weights[t]))))
         .collect();
     let slopes: Vec<DVector<f64>> = groups
         .iter()
-        .map(|group| DVector::from_fn(n, |i, _| sum(group, &|t| column(i, t).dot(&fit.residuals[t]))))
+        .map(|group| DVector::from_fn(n, |i, _| sum(group, &|t| product(column(i, t), &fit.residuals[t], &weights[t]))))
         .collect();
     // What is left of the slope at the optimum is the solver's grain, not the data's.
     let mean: DVector<f64> = slopes.iter().sum::<DVector<f64>>() + DVector::from_column_slice(&fit.x);
@@ -121,7 +121,7 @@ mod tests {
         let information = 1.0 + slopes.iter().map(DVector::norm_squared).sum::<f64>();
         let x = -slopes.iter().zip(&noise).map(|(s, n)| s.dot(n)).sum::<f64>() / information;
         let residuals = slopes.iter().zip(&noise).map(|(s, n)| n + s * x).collect();
-        let fit = Fit::new(Model::nominal(1, 0), vec![x], Vec::new(), residuals, vec![slopes]);
+        let fit = Fit::new(Model::nominal(1, 0), vec![x], Vec::new(), residuals, vec![slopes.into()]);
         (fit, information.recip().sqrt())
     }
 

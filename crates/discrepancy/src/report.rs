@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::evidence::Evidence;
+use crate::findings::Findings;
 use crate::interval::{bootstrap, middle_90, widen};
 use crate::likelihood::NOISE_FLOOR;
 use crate::locate::Cell;
@@ -125,6 +126,8 @@ pub struct Report {
     pub contact_gap: Option<ContactGap>,
     /// Held-out comparison.
     pub heldout: Heldout,
+    /// What speaks for the best effect of each round of the search: what the decision is made of.
+    pub findings: Vec<Findings>,
     /// The nominal model, re-tuned.
     pub retuned: Vec<Retuned>,
     /// Held-out episodes before and after, for plots.
@@ -215,6 +218,7 @@ impl Report {
                 unit: "chi2 per sample",
                 episodes: diagnosis.heldout_episodes.clone(),
             },
+            findings: diagnosis.findings.clone(),
             retuned: retuned(diagnosis, &samples),
             effects,
             evidence: diagnosis.evidence.clone(),
@@ -239,7 +243,7 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> 
             let gain = round.rivals[0].gain;
             let noise = settings.temperature.max(SECOND_ERROR * explained);
             explained += gain;
-            let passed = round.passed_over(&diagnosis.heldout_counts);
+            let passed = round.passed_over();
             let passed = passed.iter().map(|(_, more)| gain + more);
             let others = round.rivals.iter().skip(1).map(|rival| rival.gain).chain(passed);
             let parameters = (part.coordinates.iter())
@@ -284,7 +288,7 @@ fn bare(key: &str) -> &str {
 fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEffect]) -> Vec<&'static str> {
     let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
     let named = effects.first().map(|first| first.log_evidence);
-    let passed = round.passed_over(&diagnosis.heldout_counts);
+    let passed = round.passed_over();
     let first = named.or_else(|| round.rivals.first().map(|rival| rival.gain)).unwrap_or(0.0);
     let passed = passed.iter().map(|(kind, more)| (kind.name(), first + more));
     let mut gains: Vec<(&str, f64)> = round.rivals.iter().map(|rival| (rival.kind().name(), rival.gain)).collect();
@@ -310,7 +314,7 @@ fn ranking(diagnosis: &Diagnosis, count: f64) -> Vec<RankedEffect> {
         .map(|rival| RankedEffect {
             name: rival.kind().name(),
             log_evidence: rival.gain,
-            heldout: rival.heldout.iter().sum::<f64>() / count,
+            heldout: rival.heldout.squares.iter().sum::<f64>() / count,
         })
         .collect()
 }

@@ -127,12 +127,10 @@ impl Screening {
 /// By how much a body in the way explains episodes better. One that neither explains says nothing: a millimetre beside its place an object that meets it
 /// may go another way, but what went by freely still has to.
 pub(crate) fn met(before: &Stack, after: &Stack) -> f64 {
-    let gain = |(before, after): (&DVector<f64>, &DVector<f64>)| {
-        let [a, b] =
-            [before, after].map(|residuals| likelihood::episode_cost(residuals.norm_squared(), residuals.len()));
-        if likelihood::explained(before) { a - b } else { (a - b).max(0.0) }
+    let gain = |(episode, (a, b)): (&DVector<f64>, (f64, f64))| {
+        if likelihood::explained(episode) { a - b } else { (a - b).max(0.0) }
     };
-    before.iter().zip(after).map(gain).sum()
+    before.iter().zip(before.costs().into_iter().zip(after.costs())).map(gain).sum()
 }
 
 /// The change of a strength that is simulated.
@@ -260,13 +258,13 @@ mod tests {
     #[test]
     fn a_linear_step_moves_what_is_re_tuned_with_the_effect() {
         // Residuals that are linear in one tunable and one strength, at no noise and with columns far above the prior: the step is exact.
-        let column = |f: fn(f64) -> f64| vec![DVector::from_fn(200, |row, _| 100.0 * f(row as f64))];
+        let column = |f: fn(f64) -> f64| Stack::from(vec![DVector::from_fn(200, |row, _| 100.0 * f(row as f64))]);
         let (tuning, strength) = (column(|t| (0.1 * t).sin()), column(|t| (0.1 * t).sin() + (0.3 * t).cos()));
         // Re-tuning alone has gone to 2, where 0.5 less and an effect of 0.7 are right.
         let residuals = vec![&tuning[0] * 0.5 - &strength[0] * 0.7];
         let damping = candidate(EffectKind::ViscousDamping);
         let strengths: Vec<usize> = damping.strengths().collect();
-        let (gain, step) = linear(&damping, &strengths, &[2.0], &residuals, &[tuning], &[strength]);
+        let (gain, step) = linear(&damping, &strengths, &[2.0], &residuals.into(), &[tuning], &[strength]);
         assert!((step[0] + 0.5).abs() < 1e-2 && (step[1] - 0.7).abs() < 1e-2, "{step:?}");
         assert!(gain > 100.0, "{gain}");
     }
@@ -279,7 +277,7 @@ mod tests {
     #[test]
     fn what_met_a_body_may_go_another_way_and_what_went_by_may_not() {
         let episode = |size: f64| DVector::from_element(50, size);
-        let gain = |before: f64, after: f64| met(&vec![episode(before)], &vec![episode(after)]);
+        let gain = |before: f64, after: f64| met(&vec![episode(before)].into(), &vec![episode(after)].into());
         // A hit that is explained, one that neither explains, and a body that stands where something went by.
         assert!(gain(5.0, 1.0) > 50.0);
         assert_eq!(gain(3.0, 5.0), 0.0);

@@ -1,5 +1,7 @@
 //! The search for effects: rounds of screening, quick fits, fits with care, and a decision.
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 use physics_model::EffectKind;
 
@@ -9,12 +11,13 @@ use crate::candidate::Candidate;
 use crate::chain::{LEAST_SHARE, Link};
 use crate::diagnosis::Settings;
 use crate::fit::{Begin, Effort, Fit, STEPS, fit};
-use crate::likelihood::{mean_square, trimmed_mean};
+use crate::likelihood::{Stack, mean_square, trimmed_mean};
 use crate::locate::{Cell, locate};
 use crate::model::Model;
-use crate::rival::{Rival, Round, first_of_each, of_first, sort};
+use crate::rival::{Heldout, Rival, Round, first_of_each, of_first, sort};
 use crate::screen::{Promise, Screening, shortlist};
 use crate::study::Study;
+use crate::trial::Kind;
 
 mod retune;
 
@@ -48,10 +51,32 @@ pub(crate) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Sums of squares of the held-out episodes.
-    pub(crate) fn heldout(&self, fit: &Fit) -> Vec<f64> {
+    /// What a model leaves of the held-out episodes.
+    pub(crate) fn heldout(&self, fit: &Fit) -> Heldout {
+        let white = self.heldout_residuals(fit);
+        Heldout { squares: white.iter().map(DVector::norm_squared).collect(), costs: white.costs() }
+    }
+
+    /// Residuals of the held-out episodes.
+    pub(crate) fn heldout_residuals(&self, fit: &Fit) -> Stack {
         let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
-        self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
+        self.kept.white(&raw, fit.model.engine_errors(&fit.x))
+    }
+
+    /// Mean square of such residuals in each held-out episode, as far as they are of some kinds; of those episodes that have any.
+    pub(crate) fn heldout_errors(&self, stack: &Stack, episodes: &Episodes, of: &dyn Fn(Kind) -> bool) -> Vec<f64> {
+        let one = |group: &Range<usize>| {
+            let (mut square, mut count) = (0.0, 0_usize);
+            for place in group.clone() {
+                let blocks = &self.study.simulator.trials[self.kept.chosen[place]].blocks;
+                for (_, residual) in blocks.iter().zip(stack[place].iter()).filter(|(block, _)| of(block.kind)) {
+                    square += residual * residual;
+                    count += 1;
+                }
+            }
+            (count > 0).then(|| square / count as f64)
+        };
+        episodes.heldout.iter().filter_map(one).collect()
     }
 
     /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out or another one
@@ -209,7 +234,7 @@ impl Search<'_> {
             let more = fit.log_evidence() - pair.fit.log_evidence();
             others[index].gain = lead.gain + more;
             if more > 0.0
-                && better_heldout(&heldout, &pair.heldout, episodes)
+                && better_heldout(&heldout, &pair.heldout)
                 && lasts(&fit, &episodes.fitted, self.settings.seed)
             {
                 *pair = Rival { heldout, gain: pair.gain, fit, whole: true };
@@ -379,7 +404,7 @@ impl Search<'_> {
     pub(crate) fn learn_errors(&mut self, right: &Fit) {
         let hypothesis = right.model.hypothesis(&right.x);
         self.study.learn_errors(&hypothesis);
-        self.kept.learn_errors(&hypothesis);
+        self.kept.learn_errors_as(&hypothesis, &self.study);
     }
 
     /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.

@@ -1,7 +1,6 @@
 //! What to record next: the experiment that tells confusable effects apart.
 
 use crate::diagnosis::Diagnosis;
-use crate::likelihood::episode_cost;
 use crate::report::Verdict;
 
 /// Pairs that logs confuse, and what separates them (catalogue).
@@ -121,7 +120,8 @@ pub(crate) fn telling(diagnosis: &Diagnosis, confusion_set: &[&str]) -> Option<T
     let round = diagnosis.rounds.first()?;
     let costs = |name: &str| -> Option<Vec<f64>> {
         let rival = round.rivals.iter().find(|rival| rival.whole && rival.kind().name() == name)?;
-        let of = |place: usize| rival.fit.residuals.get(place).map(|r| episode_cost(r.norm_squared(), r.len()));
+        let costs = rival.fit.residuals.costs();
+        let of = |place: usize| costs.get(place).copied();
         (diagnosis.pieces.iter()).map(|group| group.clone().map(of).sum::<Option<f64>>()).collect()
     };
     let (first, second) = (costs(first)?, costs(second)?);

@@ -9,9 +9,10 @@ use physics_model::world::Wrench;
 use physics_model::{BodyState, EffectConfig, EffectKind};
 use rayon::prelude::*;
 
+use crate::cells::{Key, key};
 use crate::nominal::{Engine, Nominal};
 use crate::progress::Progress;
-use crate::trial::{Trial, WHOLE};
+use crate::trial::{Block, Trial, WHOLE};
 
 /// A bounce is over within a step of a slow push: it needs this many times as many.
 const BOUNCE_REFINEMENT: u32 = 3;
@@ -126,6 +127,24 @@ impl<'a> Simulator<'a> {
             hidden: Vec::new(),
         };
         (first, readings)
+    }
+
+    /// The same with the key of each residual's block, by what goes on in the simulated episode.
+    pub(crate) fn cells(
+        &self,
+        hypothesis: &Hypothesis,
+        engine: &Engine,
+        chosen: &[usize],
+    ) -> Vec<(Vec<Key>, Vec<f64>)> {
+        let (rolls, gravity_mps2) = (self.nominal.rolls(), self.nominal.header().gravity_mps2);
+        let one = |index: &usize| {
+            let trial = &self.trials[*index];
+            let (first, readings) = self.readings(hypothesis, engine, Nudge::default(), trial);
+            let phases = trial.phases(&readings, rolls, gravity_mps2);
+            let middle = |block: &Block| phases[usize::midpoint(block.first, block.end - 1)];
+            (trial.blocks.iter().map(|block| key(block, middle(block))).collect(), trial.residuals(&first, &readings))
+        };
+        chosen.par_iter().map(one).collect()
     }
 
     fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, trial: &Trial) -> Vec<f64> {

@@ -1,14 +1,16 @@
 //! The episodes that a model is fitted to, with what residuals of a right one would look like.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::DVector;
 
 use crate::budget::Budget;
-use crate::likelihood::{Stack, pick};
+use crate::cells::{Key, Times, key};
+use crate::likelihood::{Cells, Stack};
 use crate::nominal::Engine;
 use crate::simulator::{Hypothesis, Nudge, Simulator};
-use crate::trial::groups;
+use crate::trial::{Phase, groups};
 use crate::whitener::Whitener;
 
 /// Episodes with their whiteners.
@@ -23,8 +25,10 @@ pub struct Study<'a> {
     /// What its simulations are taken from; `None`: they cost nothing.
     budget: Option<&'a Budget>,
     whiteners: Vec<Whitener>,
+    cells: Vec<Arc<Cells>>,
+    times: Times,
     /// What an error of the engine of size one does to the residuals of each episode, one for each of the variants.
-    engine_errors: Vec<Stack>,
+    engine_errors: Vec<Vec<DVector<f64>>>,
 }
 
 /// Standard deviation of the start's error, in those of what is known of it, and of an error of the solver, in differences of the variants below.
@@ -64,7 +68,13 @@ impl<'a> Study<'a> {
     pub fn new(simulator: &'a Simulator<'a>, engine: Engine, chosen: Vec<usize>) -> Self {
         let plain = |index: &usize| Whitener::new(simulator.trials[*index].blocks.len(), &[]);
         let whiteners = chosen.iter().map(plain).collect();
-        Self { simulator, engine, chosen, budget: None, whiteners, engine_errors: Vec::new() }
+        // What goes on is not known before a simulation: channels alone are told apart.
+        let times = Times::default();
+        let keys = |index: &usize| -> Vec<Key> {
+            simulator.trials[*index].blocks.iter().map(|block| key(block, Phase::FreeMotion)).collect()
+        };
+        let cells = chosen.iter().map(|index| times.cells(&keys(index))).collect();
+        Self { simulator, engine, chosen, budget: None, whiteners, cells, times, engine_errors: Vec::new() }
     }
 
     /// The same with simulations that are taken from a budget.
@@ -106,15 +116,14 @@ impl<'a> Study<'a> {
     /// half the square of the result is the loss.
     #[must_use]
     pub fn white(&self, raw: &[Vec<f64>], sizes: &[f64]) -> Stack {
-        (self.whiteners.iter().zip(raw).enumerate())
-            .map(|(place, (whitener, raw))| {
-                let mut raw = DVector::from_column_slice(raw);
-                for (error, size) in self.engine_errors.iter().zip(sizes) {
-                    raw.axpy(*size, &error[place], 1.0);
-                }
-                whitener.apply(raw).map(huber)
-            })
-            .collect()
+        let white = (self.whiteners.iter().zip(raw).enumerate()).map(|(place, (whitener, raw))| {
+            let mut raw = DVector::from_column_slice(raw);
+            for (error, size) in self.engine_errors.iter().zip(sizes) {
+                raw.axpy(*size, &error[place], 1.0);
+            }
+            whitener.apply(raw).map(huber)
+        });
+        Stack::new(white.collect(), self.cells.clone())
     }
 
     /// Number of the engine's errors.
@@ -132,28 +141,52 @@ impl<'a> Study<'a> {
             budget: self.budget,
             chosen: places.iter().map(|place| self.chosen[*place]).collect(),
             whiteners: places.iter().map(|place| self.whiteners[*place].clone()).collect(),
-            engine_errors: self.engine_errors.iter().map(|error| pick(error, places)).collect(),
+            cells: places.iter().map(|place| self.cells[*place].clone()).collect(),
+            times: self.times.clone(),
+            engine_errors: (self.engine_errors.iter())
+                .map(|error| places.iter().map(|place| error[*place].clone()).collect())
+                .collect(),
         }
     }
 
-    /// Learns from simulations near `hypothesis` how large errors that last may be: those of the solver, and of the start.
+    /// Learns from simulations near `hypothesis` how large errors that last may be: those of the solver, and of the start; and how long the errors that
+    /// these do not explain last in each cell.
     pub fn learn_errors(&mut self, hypothesis: &Hypothesis) {
+        let (keys, raw) = self.learn_lasting(hypothesis);
+        let white = self.white(&raw, &[]);
+        let trials = self.chosen.iter().map(|index| &self.simulator.trials[*index]);
+        let episodes = trials.zip(&keys).zip(white.iter());
+        self.times = Times::of(episodes.map(|((trial, keys), white)| (&trial.blocks[..], &keys[..], white)));
+        self.cells = keys.iter().map(|keys| self.times.cells(keys)).collect();
+    }
+
+    /// The same with the times that another study has learnt: of episodes that are to judge a model.
+    pub fn learn_errors_as(&mut self, hypothesis: &Hypothesis, other: &Self) {
+        let (keys, _) = self.learn_lasting(hypothesis);
+        self.times = other.times.clone();
+        self.cells = keys.iter().map(|keys| self.times.cells(keys)).collect();
+    }
+
+    /// Keys of the blocks of each episode, and its residuals.
+    fn learn_lasting(&mut self, hypothesis: &Hypothesis) -> (Vec<Vec<Key>>, Vec<Vec<f64>>) {
         let simulate = |engine: &Engine, nudge| {
             self.charge();
             self.simulator.residuals(hypothesis, engine, nudge, &self.chosen)
         };
-        let plain = simulate(&self.engine, Nudge::default());
-        let change = |engine: &Engine, nudge, scale: f64| -> Stack {
+        self.charge();
+        let (keys, plain): (Vec<_>, Vec<_>) =
+            self.simulator.cells(hypothesis, &self.engine, &self.chosen).into_iter().unzip();
+        let change = |engine: &Engine, nudge, scale: f64| -> Vec<DVector<f64>> {
             let changed = simulate(engine, nudge);
             let less = |(a, b): (&Vec<f64>, &Vec<f64>)| {
                 DVector::from_iterator(a.len(), a.iter().zip(b).map(|(a, b)| scale * (a - b)))
             };
             changed.iter().zip(&plain).map(less).collect()
         };
-        let engine_errors: Vec<Stack> = (variants(&self.engine, self.simulator.nominal.has_tool()).iter())
+        let engine_errors: Vec<Vec<DVector<f64>>> = (variants(&self.engine, self.simulator.nominal.has_tool()).iter())
             .map(|(engine, scale)| change(engine, Nudge::default(), *scale))
             .collect();
-        let start_errors: Vec<Stack> =
+        let start_errors: Vec<Vec<DVector<f64>>> =
             self.starts().into_iter().map(|(nudge, scale)| change(&self.engine, nudge, scale)).collect();
         let columns = |place: usize| -> Vec<&[f64]> {
             engine_errors.iter().chain(&start_errors).map(|error| error[place].as_slice()).collect()
@@ -162,6 +195,7 @@ impl<'a> Study<'a> {
             (0..self.chosen.len()).map(|place| Whitener::new(plain[place].len(), &columns(place))).collect();
         // The start is another in each episode; the engine is the same in all, whatever else its errors do to a single one.
         self.engine_errors = engine_errors;
+        (keys, plain)
     }
 
     /// Starts from which a right model's answers should not differ, with the standard deviation of the error in such differences.
@@ -222,5 +256,5 @@ fn huber(residual: f64) -> f64 {
 /// (a − b) / by.
 #[must_use]
 pub fn difference(a: &Stack, b: &Stack, by: f64) -> Stack {
-    a.iter().zip(b).map(|(a, b)| (a - b) / by).collect()
+    a.like(a.iter().zip(b.iter()).map(|(a, b)| (a - b) / by).collect())
 }

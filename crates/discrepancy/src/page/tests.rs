@@ -60,6 +60,7 @@ fn report(verdict: Verdict) -> Report {
     ];
     let named = verdict == Verdict::Effect;
     Report {
+        findings: Vec::new(),
         version: 1,
         verdict,
         summary: "A sentence.".into(),
