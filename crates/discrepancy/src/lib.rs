@@ -64,6 +64,7 @@ pub mod screen;
 mod search;
 pub mod separate;
 pub mod simulator;
+pub mod split;
 pub mod study;
 pub mod terms;
 pub mod touch;

@@ -9,9 +9,10 @@ use crate::likelihood::NOISE_FLOOR;
 use crate::locate::Cell;
 use crate::rival::Rival;
 use crate::separate;
+use crate::split::Split;
 use crate::terms::LackingForce;
 use crate::touch::ContactGap;
-use crate::verdict::{closed_fraction, heldout_errors};
+use crate::verdict::closed_fraction;
 
 /// The verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -80,7 +81,7 @@ pub struct Heldout {
     pub closed_fraction: f64,
     /// Unit of the three.
     pub unit: &'static str,
-    /// Of each held-out episode: number in the log, before, after.
+    /// Of each held-out episode that nothing was chosen by: number in the log, before, after.
     pub episodes: Vec<(u64, f64, f64)>,
 }
 
@@ -137,6 +138,8 @@ pub struct Report {
     pub effects_in_model: Vec<&'static str>,
     /// What to record next to tell the confusion set apart.
     pub next_experiment: String,
+    /// How many episodes were fitted, chose between models, and are reported.
+    pub split: Split,
     /// Seed of the hold-out split, of the bootstrap and of the test of what is left.
     pub seed: u64,
     /// Part of how many that was held out, counted from 1, as on the command line; `None`: the share that the log says.
@@ -172,8 +175,7 @@ impl Report {
     /// What a diagnosis says.
     #[must_use]
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
-        let count = diagnosis.heldout_counts.iter().sum::<usize>().max(1) as f64;
-        let [before, after] = heldout_errors(diagnosis);
+        let [before, after] = diagnosis.reported.errors();
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed).unwrap_or_default();
         widen(&mut samples, &diagnosis.model);
         let mut effects = effects(diagnosis, &samples, settings);
@@ -201,7 +203,7 @@ impl Report {
                 diagnosis.contact_gap.as_ref().and_then(ContactGap::next_experiment),
             ),
             confusion_set,
-            ranking: ranking(diagnosis, count),
+            ranking: ranking(diagnosis),
             located: diagnosis.located.clone(),
             remaining: diagnosis.remaining.clone(),
             description,
@@ -213,11 +215,12 @@ impl Report {
                 noise_floor: NOISE_FLOOR,
                 closed_fraction: if verdict == Verdict::None { 1.0 } else { closed_fraction(before, after) },
                 unit: "chi2 per sample",
-                episodes: diagnosis.heldout_episodes.clone(),
+                episodes: diagnosis.reported.episodes.clone(),
             },
             retuned: retuned(diagnosis, &samples),
             effects,
             evidence: diagnosis.evidence.clone(),
+            split: diagnosis.split,
             seed: settings.seed,
             fold: settings.fold.map(|[part, parts]| [part + 1, parts]),
             left_out: diagnosis.left_out.clone(),
@@ -302,15 +305,16 @@ fn near_the_first<'a>(rivals: impl Iterator<Item = (&'a str, f64)>, named: Optio
     rivals.filter(|(_, gain)| best - gain < near).map(|(name, _)| name).collect()
 }
 
-fn ranking(diagnosis: &Diagnosis, count: f64) -> Vec<RankedEffect> {
+fn ranking(diagnosis: &Diagnosis) -> Vec<RankedEffect> {
     let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
     let mut rivals: Vec<&Rival> = round.rivals.iter().chain(round.passed_over_kinds()).collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let heldout = |kind| diagnosis.ranking.iter().find(|(other, _)| *other == kind).map_or(f64::NAN, |found| found.1);
     (rivals.into_iter())
         .map(|rival| RankedEffect {
             name: rival.kind().name(),
             log_evidence: rival.gain,
-            heldout: rival.heldout.iter().sum::<f64>() / count,
+            heldout: heldout(rival.kind()),
         })
         .collect()
 }

@@ -1,6 +1,5 @@
 //! The search for effects: rounds of screening, quick fits, fits with care, and a decision.
 
-use nalgebra::DVector;
 use physics_model::EffectKind;
 
 use crate::accept::{Asked, Episodes, NEGLIGIBLE, better_heldout, both_convince, convinces, lasts, may_convince};
@@ -14,6 +13,7 @@ use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::rival::{Rival, Round, first_of_each, of_first, sort};
 use crate::screen::{Promise, Screening, shortlist};
+use crate::split::squares;
 use crate::study::Study;
 
 mod retune;
@@ -37,8 +37,10 @@ const FAR: f64 = 100.0;
 pub(crate) struct Search<'a> {
     /// Episodes that models are fitted to.
     pub(crate) study: Study<'a>,
-    /// Those held out.
+    /// Those held out, by which models are chosen.
     pub(crate) kept: Study<'a>,
+    /// Those held out for the report; `None`: the same.
+    pub(crate) reported: Option<Study<'a>>,
     /// Those of the screening, with errors learnt where re-tuning alone leads.
     pub(crate) part: Study<'a>,
     /// What it may do.
@@ -50,8 +52,12 @@ pub(crate) struct Search<'a> {
 impl Search<'_> {
     /// Sums of squares of the held-out episodes.
     pub(crate) fn heldout(&self, fit: &Fit) -> Vec<f64> {
-        let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
-        self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
+        squares(&self.kept, fit)
+    }
+
+    /// Held-out episodes of the report.
+    pub(crate) fn reported(&self) -> &Study<'_> {
+        self.reported.as_ref().unwrap_or(&self.kept)
     }
 
     /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out or another one
@@ -380,6 +386,7 @@ impl Search<'_> {
         let hypothesis = right.model.hypothesis(&right.x);
         self.study.learn_errors(&hypothesis);
         self.kept.learn_errors(&hypothesis);
+        self.reported.iter_mut().for_each(|study| study.learn_errors(&hypothesis));
     }
 
     /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.

@@ -95,7 +95,7 @@ fn foot(report: &Report, words: &Words) -> Markup {
         p.soft {
             (words.mark_as("seed", "Seed")) " " (report.seed) (fold) "; " (report.rollouts) " "
             (words.mark_as("simulated episode", "simulated episodes")) ", " (fixed(report.seconds, 1)) " s. Version "
-            (report.version) " of the contract of report.json." (left_out)
+            (report.version) " of the contract of report.json. " (report.split.sentence()) (left_out)
         }
     };
     html! { (words.list()) (last) }

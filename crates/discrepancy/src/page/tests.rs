@@ -2,6 +2,7 @@ use super::page;
 use crate::evidence::{BINS, ChannelError, Course, Evidence, LAGS, Path, Residuals};
 use crate::locate::Cell;
 use crate::report::{Heldout, NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
+use crate::split::Split;
 use crate::terms::{Coefficient, FoundTerm, LackingForce};
 use crate::trial::{Kind, Phase};
 
@@ -105,6 +106,7 @@ fn report(verdict: Verdict) -> Report {
         }],
         evidence: evidence(),
         next_experiment: "Push in eight directions.".into(),
+        split: Split { fitted: 28, choosing: 6, reported: 6, shared: false },
         seed: 1,
         fold: None,
         left_out: Vec::new(),
