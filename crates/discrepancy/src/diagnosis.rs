@@ -378,12 +378,13 @@ fn conclude(
 
 /// The null hypothesis, re-tuned, and the episodes of the screening, with errors learnt near it.
 fn null_model<'a>(study: &Study<'a>) -> (Fit, Study<'a>, Vec<usize>) {
-    let tunables = study.simulator.nominal.tunables.len();
-    let first = fit(study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let (tunables, clocks) = (study.simulator.nominal.tunables.len(), study.simulator.nominal.clocks());
+    let first =
+        fit(study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&vec![0.0; tunables]), Effort::Quick);
     let places = places(study, &first);
     let mut part = study.part(&places);
     part.learn_errors(&first.model.hypothesis(&first.x));
-    let model = Model::nominal(tunables, part.engine_errors());
+    let model = Model::nominal(tunables, part.engine_errors()).with_clocks(clocks);
     let mut x = first.x;
     x.resize(model.count(), 0.0);
     (fit(&part, model, Begin::at(&x), Effort::Quick), part, places)

@@ -56,10 +56,11 @@ pub fn retuned(log: &Log, nominal: &Nominal, seed: u64) -> Nominal {
     let trials = trials(log, &log.split(seed).fit, nominal.has_tool());
     let simulator = Simulator::new(nominal, &trials);
     let mut study = Study::new(&simulator, nominal.engine(), (0..trials.len()).collect());
-    let tunables = nominal.tunables.len();
-    let first = fit(&study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let (tunables, clocks) = (nominal.tunables.len(), nominal.clocks());
+    let first =
+        fit(&study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&vec![0.0; tunables]), Effort::Quick);
     study.learn_errors(&first.model.hypothesis(&first.x));
-    let model = Model::nominal(tunables, study.engine_errors());
+    let model = Model::nominal(tunables, study.engine_errors()).with_clocks(clocks);
     let mut x = first.x;
     x.resize(model.count(), 0.0);
     let found = fit(&study, model, Begin::at(&x), Effort::Full);

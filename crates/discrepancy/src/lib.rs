@@ -37,6 +37,7 @@ mod begin;
 pub mod budget;
 pub mod candidate;
 mod chain;
+mod clock;
 mod context;
 pub mod diagnosis;
 mod driven;

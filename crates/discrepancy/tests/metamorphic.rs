@@ -42,7 +42,10 @@ fn heavier(mut log: Log, factor: f64) -> Log {
         *stddev = stddev.map(|stddev| factor * stddev);
     }
     let of = |channel| {
-        matches!(channel, Channel::WristForce(_) | Channel::WristTorque(_) | Channel::JointTorque(_) | Channel::AddedMass)
+        matches!(
+            channel,
+            Channel::WristForce(_) | Channel::WristTorque(_) | Channel::JointTorque(_) | Channel::AddedMass
+        )
     };
     change(&mut log, of, |value| factor * value);
     log
@@ -125,7 +128,13 @@ fn turned(mut log: Log, angle_rad: f64) -> Log {
 /// The same names, and values that are `factor` of their units times as large.
 fn assert_same(found: &Report, plain: &Report, how: &str, factor: impl Fn(&str) -> f64) {
     let names = |report: &Report| report.effects.iter().map(|effect| effect.name).collect::<Vec<_>>();
-    assert_eq!((found.verdict, names(found)), (plain.verdict, names(plain)), "{how}: {} {}", found.summary, plain.summary);
+    assert_eq!(
+        (found.verdict, names(found)),
+        (plain.verdict, names(plain)),
+        "{how}: {} {}",
+        found.summary,
+        plain.summary
+    );
     for (found, plain) in found.effects.iter().zip(&plain.effects) {
         for (found, plain) in found.parameters.iter().zip(&plain.parameters) {
             let factor = factor(plain.unit);
