@@ -16,7 +16,7 @@ use crate::fit::{Begin, Effort, Fit, fit};
 use crate::likelihood::mean_square;
 use crate::locate::{Cell, locate};
 use crate::model::Model;
-use crate::noise::NoiseLevels;
+use crate::noise::{NoiseLevels, SensorNoise};
 use crate::nominal::{Nominal, Tunable};
 use crate::plausible;
 use crate::progress::Progress;
@@ -176,6 +176,8 @@ pub struct Diagnosis {
     pub mean_squares: Vec<f64>,
     /// What re-tuning may change, in units of the log.
     pub tunables: Vec<Tunable>,
+    /// Noise of the sensors, in units of the log.
+    pub noise: Vec<SensorNoise>,
     /// Those that everything else is in but plots and what is said of an unknown gap.
     pub(crate) units: Units,
     /// Where the re-tuned nominal model disagrees.
@@ -303,7 +305,8 @@ fn diagnose_among(
     };
     simulator.stage("fitting effects");
     let found = search.effects(&screening, &null, &episodes);
-    conclude(&search, found, episodes, About { log: name, units, tunables, left_out })
+    let noise = noise.all().map(|noise| noise.in_units(&units)).collect();
+    conclude(&search, found, episodes, About { log: name, units, tunables, noise, left_out })
 }
 
 /// What a diagnosis says of its log.
@@ -311,6 +314,7 @@ struct About<'a> {
     log: &'a str,
     units: Units,
     tunables: Vec<Tunable>,
+    noise: Vec<SensorNoise>,
     left_out: Vec<u64>,
 }
 
@@ -364,6 +368,7 @@ fn conclude(
         effects_in_model: simulator.nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
         tunables: about.tunables,
         units: about.units,
+        noise: about.noise,
         lacking_force: None,
         contact_gap: None,
         rollouts: 0,

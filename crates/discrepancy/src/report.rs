@@ -7,6 +7,7 @@ use crate::evidence::Evidence;
 use crate::interval::{bootstrap, middle_90, widen};
 use crate::likelihood::NOISE_FLOOR;
 use crate::locate::Cell;
+use crate::noise::SensorNoise;
 use crate::rival::Rival;
 use crate::separate;
 use crate::split::Split;
@@ -138,6 +139,8 @@ pub struct Report {
     pub effects_in_model: Vec<&'static str>,
     /// What to record next to tell the confusion set apart.
     pub next_experiment: String,
+    /// Noise of each sensor that was used, and where it comes from.
+    pub noise: Vec<SensorNoise>,
     /// How many episodes were fitted, chose between models, and are reported.
     pub split: Split,
     /// Seed of the hold-out split, of the bootstrap and of the test of what is left.
@@ -160,6 +163,28 @@ const NO_LIKELIER: f64 = 0.5;
 const SECOND_ERROR: f64 = 0.03;
 
 impl Report {
+    /// Which noise was used.
+    #[must_use]
+    pub fn noise_sentence(&self) -> String {
+        let sentences: Vec<String> = self.noise.iter().map(SensorNoise::sentence).collect();
+        format!("Noise: {}.", sentences.join("; "))
+    }
+
+    /// Which clocks differ from the tool's by more than their intervals.
+    #[must_use]
+    pub fn clock_sentences(&self) -> Vec<String> {
+        let clock = |value: &Retuned| {
+            let whose = value.key.strip_prefix("clock.")?.strip_suffix("_secs")?;
+            let [low, high] = value.interval90;
+            let late = if value.value > 0.0 { "late" } else { "early" };
+            (low * high > 0.0).then(|| {
+                let [ms, low, high] = [value.value, low, high].map(|secs| 1e3 * secs);
+                format!("The clock of the {whose} is {:.1} ms {late} against the tool's (90 %: {low:.1} to {high:.1} ms); re-tuned, no effect.", ms.abs())
+            })
+        };
+        self.retuned.iter().filter_map(clock).collect()
+    }
+
     /// Which episodes were left out, if any.
     #[must_use]
     pub fn left_out_sentence(&self) -> Option<String> {
@@ -220,6 +245,7 @@ impl Report {
             retuned: retuned(diagnosis, &samples),
             effects,
             evidence: diagnosis.evidence.clone(),
+            noise: diagnosis.noise.clone(),
             split: diagnosis.split,
             seed: settings.seed,
             fold: settings.fold.map(|[part, parts]| [part + 1, parts]),
