@@ -42,12 +42,13 @@ pub(crate) fn shake(part: &Study, best: &mut Fit) {
 }
 
 /// Pairs of effects that do nearly the same: what one does at some strength, the other does at another.
-const TWINS: [[EffectKind; 2]; 6] = [
+const TWINS: [[EffectKind; 2]; 7] = [
     [EffectKind::TableTilt, EffectKind::ConstantForce],
     [EffectKind::ViscousDamping, EffectKind::QuadraticDrag],
     [EffectKind::ForceBias, EffectKind::WristPayload],
     [EffectKind::PoseScale, EffectKind::TimeBase],
     [EffectKind::PoseDelay, EffectKind::ActuationDelay],
+    [EffectKind::ForceDelay, EffectKind::ForceLowPass],
     [EffectKind::FrictionLevel, EffectKind::ForceGain],
 ];
 
@@ -194,8 +195,14 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     }
     tried.extend(friction_for_mass(part, base, &promise.candidate).map(simulated));
     let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
-    let Place { x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
-    Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() }
+    let Place { mut x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
+    let mut jacobian = base.jacobian.clone();
+    // A clock that gives way is not skewed, and changes nothing.
+    for clock in part.simulator.nominal.replaced_by(promise.candidate.kind()) {
+        x[clock] = 0.0;
+        jacobian[clock].iter_mut().for_each(|episode| episode.fill(0.0));
+    }
+    Begin { x, raw: Some(raw), jacobian }
 }
 
 /// Coordinates at which `other` does roughly what `found` does at its coordinates `a`, beside the nominal model re-tuned to `z`; `None` where it

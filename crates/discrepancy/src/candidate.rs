@@ -197,9 +197,13 @@ fn applies(kind: EffectKind, context: &Context) -> bool {
     use EffectKind as K;
     let sphere = context.theta.object.shape == ObjectShape::Sphere;
     match kind {
-        K::ForceBias | K::ForceDrift | K::ForceGain | K::ForceLowPass | K::ForceSaturation | K::WristPayload => {
-            context.forces
-        }
+        K::ForceBias
+        | K::ForceDrift
+        | K::ForceGain
+        | K::ForceLowPass
+        | K::ForceSaturation
+        | K::ForceDelay
+        | K::WristPayload => context.forces,
         K::JointFriction => context.joint_torques,
         K::Backlash => context.joints,
         K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion => context.tool,

@@ -50,7 +50,8 @@ impl Search<'_> {
         let (mut links, mut gained) = (Vec::new(), 0.0);
         // What is done with them in the end: to learn errors, and to fit the model without them.
         let simulations = self.study.simulations_to_learn();
-        self.reserve = simulations * (self.study.rollouts() + self.kept.rollouts())
+        self.reserve = simulations
+            * (self.study.rollouts() + self.kept.rollouts() + self.reported.as_ref().map_or(0, Study::rollouts))
             + (null.model.tunables + STEPS + 1) * self.study.rollouts();
         let (mut part, mut at) = (self.part.clone(), null.clone());
         while at.model.parts.len() < self.settings.effects && self.affords_one_more(&part, &at.model) {

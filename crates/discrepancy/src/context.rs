@@ -1,5 +1,7 @@
 //! What is known of a log before any effect is tried.
 
+use std::collections::BTreeSet;
+
 use measured_log::{Channel, Episode, Log};
 use physics_model::effect;
 use physics_model::{EffectConfig, ObjectShape, ObjectTheta};
@@ -39,7 +41,10 @@ pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels)
     let has = |kind: Kind| noise.of(kind).is_some();
     let mut path: Vec<[f64; 2]> = Vec::new();
     let mut forces_n: Vec<f64> = Vec::new();
-    for episode in &log.episodes {
+    // Held-out episodes have no say.
+    let ids: BTreeSet<u64> = study.chosen.iter().map(|index| study.simulator.trials[*index].id).collect();
+    let fitted = || log.episodes.iter().filter(|episode| ids.contains(&episode.id));
+    for episode in fitted() {
         for row in 0..episode.rows() {
             if let Some([x, y, _]) = episode.vector(Channel::ObjectPosition, row)
                 && path.last().is_none_or(|last| distance(*last, [x, y]) > MOVED_M)
@@ -62,7 +67,7 @@ pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels)
         patches_m,
         largest_force_n: forces_n.iter().copied().fold(0.0, f64::max),
         usual_force_n: quantile(forces_n, 0.99),
-        usual_speed_mps: quantile(log.episodes.iter().flat_map(speeds_mps).collect(), 0.95),
+        usual_speed_mps: quantile(fitted().flat_map(speeds_mps).collect(), 0.95),
         tool: nominal.has_tool(),
         outline: matches!(nominal.header().object.shape, measured_log::Shape::Prism { .. }),
         forces: has(Kind::WristForce) || has(Kind::JointTorque),
@@ -120,7 +125,8 @@ fn placed(study: &Study, null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<P
     let simulator = study.simulator;
     let hypothesis = null.model.hypothesis(&null.x);
     let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
-    let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
+    let fitted = || study.chosen.par_iter().map(|index| &simulator.trials[*index]);
+    let courses: Vec<(&Trial, Vec<_>)> = fitted().map(|trial| (trial, simulate(trial))).collect();
     let [x, y, _] = object.size_m;
     let outlines = Outlines {
         sides_m: (object.shape == ObjectShape::Box).then_some([0.5 * x, 0.5 * y]),

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use measured_log::Log;
-use physics_model::EffectConfig;
+use physics_model::{EffectConfig, EffectKind};
 
 use crate::accept::Episodes;
 use crate::budget::Budget;
@@ -17,7 +17,7 @@ use crate::fit::{Begin, Effort, Fit, fit};
 use crate::likelihood::mean_square;
 use crate::locate::{Cell, locate};
 use crate::model::Model;
-use crate::noise::NoiseLevels;
+use crate::noise::{NoiseLevels, SensorNoise};
 use crate::nominal::{Nominal, Tunable};
 use crate::plausible;
 use crate::progress::Progress;
@@ -27,10 +27,11 @@ use crate::rival::Round;
 use crate::screen::{Screening, places};
 use crate::search::Search;
 use crate::simulator::Simulator;
+use crate::split::{Compared, HeldOut, LEAST_FITTED, Split, ranking};
 use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
 use crate::touch::{ContactGap, contact_gap};
-use crate::trial::{Trial, groups};
+use crate::trial::groups;
 use crate::units::Units;
 use crate::verdict::{comes_near, verdict};
 
@@ -154,14 +155,20 @@ pub struct Diagnosis {
     /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out and no other promises enough, no more effects
     /// are allowed, several were found at once or the budget is used up.
     pub rounds: Vec<Round>,
-    /// Sums of squares of the held-out episodes: nominal and accepted model, with the errors of the accepted one.
+    /// Of the held-out episodes by which models are chosen, sums of squares: nominal and accepted model, with the errors of the accepted one.
     pub heldout: [Vec<f64>; 2],
-    /// Number of residuals of each held-out piece.
+    /// Number of residuals of each of their pieces.
     pub heldout_counts: Vec<usize>,
-    /// Of each held-out episode: number in the log, mean squares of nominal and accepted model.
+    /// Of each of them: number in the log, mean squares of nominal and accepted model.
     pub heldout_episodes: Vec<(u64, f64, f64)>,
     /// What speaks for the first rival of each round.
     pub findings: Vec<Findings>,
+    /// The held-out episodes that nothing was chosen by.
+    pub reported: HeldOut,
+    /// Mean squares of those under each effect that was compared for the first place.
+    pub ranking: Vec<(EffectKind, f64)>,
+    /// How many episodes do what.
+    pub split: Split,
     /// The verdict.
     pub verdict: Verdict,
     /// Why it is `unknown`.
@@ -172,6 +179,8 @@ pub struct Diagnosis {
     pub mean_squares: Vec<f64>,
     /// What re-tuning may change, in units of the log.
     pub tunables: Vec<Tunable>,
+    /// Noise of the sensors, in units of the log.
+    pub noise: Vec<SensorNoise>,
     /// Those that everything else is in but plots and what is said of an unknown gap.
     pub(crate) units: Units,
     /// Where the re-tuned nominal model disagrees.
@@ -221,6 +230,7 @@ impl Diagnosis {
         self.model = self.nominal.clone();
         self.heldout[1] = self.heldout[0].clone();
         self.heldout_episodes.iter_mut().for_each(|(_, before, after)| *after = *before);
+        self.reported.take_back();
         self.remaining = self.located.clone();
         self.evidence.take_back();
     }
@@ -265,7 +275,8 @@ fn diagnose_among(
     let nominal = &nominal.in_units(&units.inverse())?;
     let noise = NoiseLevels::of_log(log);
     plausible::check(log, name, nominal, (&noise, &units), LEAST_FITTED)?;
-    let Compared { trials, sides: [fitted, heldout], left_out } = trials(log, name, nominal, &noise, settings)?;
+    let Compared { trials, fitted, choosing, reported, left_out } =
+        Compared::new(log, name, nominal, &noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
     let simulator = Simulator::new(nominal, &trials).watched_by(progress, settings.limit);
@@ -275,12 +286,8 @@ fn diagnose_among(
     // where nothing explains much more.
     let study = Study::new(&simulator, engine, fitted);
     let (null, part, places) = null_model(&study);
-    let no_numbers = || {
-        let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
-        Error::Unfit { log: name.into(), reason }
-    };
     if !null.log_evidence().is_finite() {
-        return Err(no_numbers());
+        return Err(no_numbers(name));
     }
     simulator.stage("screening the effects");
     let context = context(&study, &null, log, &noise);
@@ -289,8 +296,10 @@ fn diagnose_among(
     let limits = [settings.rollouts, settings.most, settings.limit];
     let budget = Budget::new(limits.map(|limit| limit.saturating_sub(before)));
     let screening = Screening::new(&part, places, &null, &catalogue(&context));
-    let [study, kept, part] = [study, Study::new(&simulator, engine, heldout), part].map(|study| study.within(&budget));
-    let mut search = Search { study, kept, part, settings, reserve: 0 };
+    let [study, kept, part] =
+        [study, Study::new(&simulator, engine, choosing), part].map(|study| study.within(&budget));
+    let reported = reported.map(|reported| Study::new(&simulator, engine, reported).within(&budget));
+    let mut search = Search { study, kept, reported, part, settings, reserve: 0 };
 
     let episodes = Episodes {
         fitted: search.study.groups(),
@@ -298,51 +307,82 @@ fn diagnose_among(
         counts: search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect(),
     };
     simulator.stage("fitting effects");
-    let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
+    let found = search.effects(&screening, &null, &episodes);
+    let noise = noise.all().map(|noise| noise.in_units(&units)).collect();
+    conclude(&search, found, episodes, About { log: name, units, tunables, noise, left_out })
+}
+
+/// What a diagnosis says of its log.
+struct About<'a> {
+    log: &'a str,
+    units: Units,
+    tunables: Vec<Tunable>,
+    noise: Vec<SensorNoise>,
+    left_out: Vec<u64>,
+}
+
+fn no_numbers(log: &str) -> Error {
+    let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
+    Error::Unfit { log: log.into(), reason }
+}
+
+/// From what a search accepted and compared, and what that leaves where it is known, to a verdict.
+fn conclude(
+    search: &Search,
+    (accepted, rounds, remaining): (Fit, Vec<Round>, Option<Vec<Cell>>),
+    episodes: Episodes,
+    about: About,
+) -> Result<Diagnosis, Error> {
+    let (simulator, settings) = (search.study.simulator, search.settings);
     simulator.stage("comparing held-out episodes, before and after");
     let null = rounds[0].base.clone();
-    let heldout = [&null, &accepted].map(|fit| search.heldout(fit).squares);
     let lead = |round: &Round| {
         let lead = round.rivals.first().filter(|rival| !rival.heldout.costs.is_empty())?;
-        Some(Findings::of(&search, round, lead, &episodes))
+        Some(Findings::of(search, round, lead, &episodes))
     };
     let findings = rounds.iter().filter_map(lead).collect();
-    if !null.log_evidence().is_finite() || !heldout.iter().flatten().all(|sum| sum.is_finite()) {
-        return Err(no_numbers());
+    let choosing = HeldOut::new(&search.kept, [&null, &accepted]);
+    let reported = search.reported.as_ref().map(|study| HeldOut::new(study, [&null, &accepted]));
+    let reported = reported.unwrap_or_else(|| choosing.clone());
+    if !null.log_evidence().is_finite() || ![&choosing, &reported].iter().all(|held| held.is_finite()) {
+        return Err(no_numbers(about.log));
     }
-    let heldout_episodes = by_episode(&heldout, &episodes, |place| trials[search.kept.chosen[place]].id);
     let fitted_mean = |group: &Range<usize>| mean_square(&accepted.residuals[group.clone()]);
     let mean_squares =
-        episodes.fitted.iter().map(fitted_mean).chain(heldout_episodes.iter().map(|(_, _, after)| *after)).collect();
+        episodes.fitted.iter().map(fitted_mean).chain(choosing.episodes.iter().map(|(_, _, after)| *after)).collect();
     let chosen = &search.study.chosen;
-    let located = locate(&simulator, chosen, &null, settings.seed);
+    let located = locate(simulator, chosen, &null, settings.seed);
     let remaining = match remaining {
         Some(cells) => cells,
         None if accepted.model.parts.is_empty() => located.clone(),
-        None => locate(&simulator, chosen, &accepted, settings.seed),
+        None => locate(simulator, chosen, &accepted, settings.seed),
     };
     let mut diagnosis = Diagnosis {
         located,
         remaining,
-        evidence: Evidence::new(&search.kept, &null, &accepted).in_units(&units),
+        evidence: Evidence::new(search.reported(), &null, &accepted).in_units(&about.units),
         nominal: null,
         model: accepted,
+        ranking: ranking(&rounds, search.reported()),
         rounds,
-        heldout,
-        heldout_counts: episodes.counts,
-        heldout_episodes,
+        heldout: choosing.sums,
+        heldout_counts: choosing.counts,
+        heldout_episodes: choosing.episodes,
+        split: Split::new(search),
+        reported,
         findings,
         mean_squares,
         verdict: Verdict::None,
         reason: None,
-        effects_in_model: nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
-        tunables,
-        units,
+        effects_in_model: simulator.nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
+        tunables: about.tunables,
+        units: about.units,
+        noise: about.noise,
         lacking_force: None,
         contact_gap: None,
         rollouts: 0,
-        left_out,
-        fitted_ids: episodes.fitted.iter().map(|group| trials[chosen[group.start]].id).collect(),
+        left_out: about.left_out,
+        fitted_ids: episodes.fitted.iter().map(|group| simulator.trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };
     diagnosis.judge(&search.study, settings);
@@ -350,113 +390,78 @@ fn diagnose_among(
     Ok(diagnosis)
 }
 
-/// Of each held-out episode, whose pieces come one after another: number in the log, mean squares before and after. `id` says the number of a piece.
-fn by_episode(heldout: &[Vec<f64>; 2], episodes: &Episodes, id: impl Fn(usize) -> u64) -> Vec<(u64, f64, f64)> {
-    let one = |group: &Range<usize>| {
-        let count = episodes.counts[group.clone()].iter().sum::<usize>().max(1) as f64;
-        let [before, after] = [0, 1].map(|i| heldout[i][group.clone()].iter().sum::<f64>() / count);
-        (id(group.start), before, after)
-    };
-    episodes.heldout.iter().map(one).collect()
-}
-
 /// The null hypothesis, re-tuned, and the episodes of the screening, with errors learnt near it.
 fn null_model<'a>(study: &Study<'a>) -> (Fit, Study<'a>, Vec<usize>) {
-    let tunables = study.simulator.nominal.tunables.len();
-    let first = fit(study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let (tunables, clocks) = (study.simulator.nominal.tunables.len(), study.simulator.nominal.clocks());
+    let first =
+        fit(study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&vec![0.0; tunables]), Effort::Quick);
     let places = places(study, &first);
     let mut part = study.part(&places);
     part.learn_errors(&first.model.hypothesis(&first.x));
-    let model = Model::nominal(tunables, part.engine_errors());
+    let model = Model::nominal(tunables, part.engine_errors()).with_clocks(clocks);
     let mut x = first.x;
     x.resize(model.count(), 0.0);
     (fit(&part, model, Begin::at(&x), Effort::Quick), part, places)
 }
 
-/// What a log is compared by.
-struct Compared {
-    trials: Vec<Trial>,
-    /// Places of what is fitted and of what is held out.
-    sides: [Vec<usize>; 2],
-    /// Numbers of episodes that cannot be simulated.
-    left_out: Vec<u64>,
-}
-
-/// What the log is compared by, and which of it is fitted and held out.
-fn trials(
-    log: &Log,
-    name: &str,
-    nominal: &Nominal,
-    noise: &NoiseLevels,
-    settings: &Settings,
-) -> Result<Compared, Error> {
-    let split = match settings.fold {
-        Some([part, parts]) => log.fold(settings.seed, part, parts),
-        None => log.split(settings.seed),
-    };
-    let mut trials = Vec::new();
-    let mut sides = [Vec::new(), Vec::new()];
-    let mut left_out = Vec::new();
-    for (index, episode) in log.episodes.iter().enumerate() {
-        let side = &mut sides[usize::from(split.holdout.contains(&index))];
-        let pieces = Trial::of_episode(log, episode, noise, nominal.has_tool());
-        if pieces.is_empty() {
-            left_out.push(episode.id);
-        }
-        side.extend(trials.len()..trials.len() + pieces.len());
-        trials.extend(pieces);
-    }
-    let episodes = |side: &[usize]| groups(side.iter().map(|index| &trials[*index])).len();
-    let [fitted, heldout] = [episodes(&sides[0]), episodes(&sides[1])];
-    if fitted < LEAST_FITTED || heldout == 0 {
-        let reason = format!(
-            "expected at least {LEAST_FITTED} episodes to fit and one held out, each with a pose of the object and a row after it, \
-             found {fitted} and {heldout}"
-        );
-        return Err(Error::Unfit { log: name.into(), reason });
-    }
-    Ok(Compared { trials, sides, left_out })
-}
-
-/// Episodes that a fit needs: a bootstrap of fewer says nothing.
-const LEAST_FITTED: usize = 4;
-
 #[cfg(test)]
 mod tests {
+    use measured_log::{Axis, Channel};
+
     use super::*;
     use crate::report::Report;
+    use crate::split::reported;
 
-    /// What a report says of a recorded log whose candidates `catalogue` changes, but for what it cost.
-    fn answer(set: &str, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
-        let folder =
-            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs").join(set);
-        let log = measured_log::read(&folder).unwrap();
-        let nominal = Nominal::new(&log.header, crate::rig_tool(&log, None).unwrap()).unwrap();
+    fn recorded(set: &str) -> Log {
+        let logs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
+        measured_log::read(&logs.join(set)).unwrap()
+    }
+
+    /// What a report says of a log whose candidates `catalogue` changes, but for what it cost.
+    fn answer(log: &Log, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
+        let nominal = Nominal::new(&log.header, crate::rig_tool(log, None).unwrap()).unwrap();
         let settings = Settings::default();
         let made = |context: &Context| catalogue(candidates(context));
-        let diagnosis = diagnose_among(&log, set, &nominal, &settings, &(), &made).unwrap();
+        let diagnosis = diagnose_among(log, "log", &nominal, &settings, &(), &made).unwrap();
         let mut report = serde_json::to_value(Report::new(&diagnosis, &settings, 0.0)).unwrap();
         report.as_object_mut().unwrap().remove("rollouts");
         report
     }
 
     #[test]
+    fn what_is_reported_has_no_say() {
+        let log = recorded("set-003");
+        let plain = answer(&log, |all| all);
+        let mut moved = log.clone();
+        for index in reported(&log, &log.split(1).holdout) {
+            let cells = moved.episodes[index].channels.get_mut(&Channel::ObjectPosition(Axis::X)).unwrap();
+            *cells = cells.iter().enumerate().map(|(row, x)| x.map(|x| x + 1e-4 * row as f64)).collect();
+        }
+        let found = answer(&moved, |all| all);
+        for key in ["verdict", "effects", "confusion_set", "retuned", "located", "remaining"] {
+            assert_eq!(found[key], plain[key], "{key}");
+        }
+        assert!(found["heldout"]["after"].as_f64() > plain["heldout"]["after"].as_f64());
+        assert_eq!(plain["split"]["shared"], false);
+    }
+
+    #[test]
     fn what_else_the_catalogue_has_and_in_which_order_changes_no_answer() {
         for set in ["set-003", "set-011"] {
-            let plain = answer(set, |all| all);
+            let log = recorded(set);
+            let plain = answer(&log, |all| all);
             let reversed = |mut all: Vec<Candidate>| {
                 all.reverse();
                 all
             };
-            assert_eq!(answer(set, reversed), plain, "{set}, reversed");
+            assert_eq!(answer(&log, reversed), plain, "{set}, reversed");
             // Of one kind one is fitted, however many there are.
             let more = |mut all: Vec<Candidate>| {
-                let leak =
-                    all.iter().find(|candidate| candidate.kind() == physics_model::EffectKind::MassLeak).cloned();
+                let leak = all.iter().find(|candidate| candidate.kind() == EffectKind::MassLeak).cloned();
                 all.extend(std::iter::repeat_n(leak, 20).flatten());
                 all
             };
-            assert_eq!(answer(set, more), plain, "{set}, more");
+            assert_eq!(answer(&log, more), plain, "{set}, more");
         }
     }
 }

@@ -32,6 +32,10 @@ pub struct Findings {
     pub motion_after: f64,
     /// Error with of forces and torques; 1 without such sensors.
     pub force_after: f64,
+    /// Error of the object's place without and with, as a share of how far it moves: root mean squares.
+    pub motion_share: [f64; 2],
+    /// The same of the wrist's force, as a share of its size; 0 without a sensor.
+    pub force_share: [f64; 2],
     /// Largest strength, in standard deviations of its prior.
     pub size: f64,
     /// Number of fitted and of held-out episodes.
@@ -41,8 +45,9 @@ pub struct Findings {
 impl Findings {
     /// Of a rival of a round.
     pub(crate) fn of(search: &Search, round: &Round, rival: &Rival, episodes: &Episodes) -> Self {
-        let noise = |fit: &Fit| search.heldout_residuals(fit);
-        let [without, with] = [&round.base, &rival.fit].map(noise);
+        let raws = [&round.base, &rival.fit].map(|fit| search.kept.raw(&fit.model.hypothesis(&fit.x)));
+        let white = |(fit, raw): (&Fit, &Vec<Vec<f64>>)| search.kept.white(raw, fit.model.engine_errors(&fit.x));
+        let [without, with] = [white((&round.base, &raws[0])), white((&rival.fit, &raws[1]))];
         let errors = |stack: &Stack, of: &dyn Fn(Kind) -> bool| search.heldout_errors(stack, episodes, of);
         let all = |_: Kind| true;
         let [before, after] = [&without, &with].map(|stack| errors(stack, &all));
@@ -74,6 +79,8 @@ impl Findings {
             after: trimmed(after),
             motion_after: trimmed(errors(&with, &is_motion)),
             force_after: trimmed(errors(&with, &is_force)),
+            motion_share: raws.each_ref().map(|raw| search.heldout_share(raw, Kind::ObjectPosition)),
+            force_share: raws.each_ref().map(|raw| search.heldout_share(raw, Kind::WristForce)),
             size: strengths.fold(0.0, f64::max),
             episodes: [episodes.fitted.len(), episodes.heldout.len()],
         }

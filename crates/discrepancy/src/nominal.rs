@@ -8,8 +8,9 @@ use std::sync::Arc;
 use measured_log::{Header, Number, Shape};
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::rig::{Prism, Rig, RigObject, RigShape, RigTool};
-use physics_model::{EffectConfig, ObjectShape};
+use physics_model::{EffectConfig, EffectKind, ObjectShape};
 
+use crate::clock::{self, Clock};
 use crate::error::Error;
 use crate::units::Units;
 
@@ -103,12 +104,14 @@ enum Place {
     Size(usize),
     Inertia(usize),
     Restitution,
+    Clock(Clock),
 }
 
 impl Place {
     fn unit(self) -> &'static str {
         match self {
             Self::TableFriction | Self::ToolFriction | Self::Restitution => "",
+            Self::Clock(_) => "s",
             Self::TableHeight | Self::Com(_) | Self::Size(_) => "m",
             Self::Mass => "kg",
             Self::Inertia(_) => "kg·m²",
@@ -163,7 +166,16 @@ impl Nominal {
 
     fn uncertain(&self) -> Vec<Tunable> {
         let header = &self.header;
-        let mut all = Vec::new();
+        // First, where [`crate::model`] looks for them.
+        let clocks = Clock::ALL.into_iter().filter(|_| self.has_tool());
+        let clock = |clock: Clock| Tunable {
+            key: clock.key().into(),
+            mean: 0.0,
+            stddev: clock::STDDEV_SECS,
+            positive: false,
+            place: Place::Clock(clock),
+        };
+        let mut all: Vec<Tunable> = clocks.map(clock).collect();
         let mut add = |key: String, number: Number, positive: bool, place: Place| {
             if let Number::Uncertain { mean, stddev } = number {
                 all.push(Tunable { key, mean, stddev, positive, place });
@@ -236,6 +248,29 @@ impl Nominal {
     /// Whether re-tuning may change a number of the log.
     pub(crate) fn tunes(&self, key: &str) -> bool {
         self.tunables.iter().any(|tunable| tunable.key == key)
+    }
+
+    /// Number of clocks that may be skewed: the first of what re-tuning may change.
+    #[must_use]
+    pub fn clocks(&self) -> usize {
+        self.tunables.iter().filter(|tunable| matches!(tunable.place, Place::Clock(_))).count()
+    }
+
+    /// By how much clocks at coordinates `z` are late, s, in the order of [`Clock::ALL`], beside these effects.
+    pub(crate) fn skews_secs<'a>(&self, z: &[f64], effects: impl Iterator<Item = &'a EffectConfig>) -> [f64; 2] {
+        let kinds: Vec<EffectKind> = effects.map(EffectConfig::kind).collect();
+        Clock::ALL.map(|clock| {
+            let place = self.tunables.iter().position(|tunable| tunable.place == Place::Clock(clock));
+            let replaced = kinds.iter().any(|kind| clock.gives_way_to(*kind));
+            place.filter(|_| !replaced).map_or(0.0, |place| self.tunables[place].value(z[place]))
+        })
+    }
+
+    /// Coordinates of clocks that give way to an effect.
+    pub(crate) fn replaced_by(&self, kind: EffectKind) -> impl Iterator<Item = usize> + '_ {
+        let gives_way =
+            move |tunable: &Tunable| matches!(tunable.place, Place::Clock(clock) if clock.gives_way_to(kind));
+        self.tunables.iter().enumerate().filter(move |(_, tunable)| gives_way(tunable)).map(|(index, _)| index)
     }
 
     /// Whether the object rolls.

@@ -8,11 +8,13 @@ use crate::findings::Findings;
 use crate::interval::{bootstrap, middle_90, widen};
 use crate::likelihood::NOISE_FLOOR;
 use crate::locate::Cell;
+use crate::noise::SensorNoise;
 use crate::rival::Rival;
 use crate::separate;
+use crate::split::Split;
 use crate::terms::LackingForce;
 use crate::touch::ContactGap;
-use crate::verdict::{closed_fraction, heldout_errors};
+use crate::verdict::closed_fraction;
 
 /// The verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -81,7 +83,7 @@ pub struct Heldout {
     pub closed_fraction: f64,
     /// Unit of the three.
     pub unit: &'static str,
-    /// Of each held-out episode: number in the log, before, after.
+    /// Of each held-out episode that nothing was chosen by: number in the log, before, after.
     pub episodes: Vec<(u64, f64, f64)>,
 }
 
@@ -140,6 +142,10 @@ pub struct Report {
     pub effects_in_model: Vec<&'static str>,
     /// What to record next to tell the confusion set apart.
     pub next_experiment: String,
+    /// Noise of each sensor that was used, and where it comes from.
+    pub noise: Vec<SensorNoise>,
+    /// How many episodes were fitted, chose between models, and are reported.
+    pub split: Split,
     /// Seed of the hold-out split, of the bootstrap and of the test of what is left.
     pub seed: u64,
     /// Part of how many that was held out, counted from 1, as on the command line; `None`: the share that the log says.
@@ -160,6 +166,28 @@ const NO_LIKELIER: f64 = 0.5;
 const SECOND_ERROR: f64 = 0.03;
 
 impl Report {
+    /// Which noise was used.
+    #[must_use]
+    pub fn noise_sentence(&self) -> String {
+        let sentences: Vec<String> = self.noise.iter().map(SensorNoise::sentence).collect();
+        format!("Noise: {}.", sentences.join("; "))
+    }
+
+    /// Which clocks differ from the tool's by more than their intervals.
+    #[must_use]
+    pub fn clock_sentences(&self) -> Vec<String> {
+        let clock = |value: &Retuned| {
+            let whose = value.key.strip_prefix("clock.")?.strip_suffix("_secs")?;
+            let [low, high] = value.interval90;
+            let late = if value.value > 0.0 { "late" } else { "early" };
+            (low * high > 0.0).then(|| {
+                let [ms, low, high] = [value.value, low, high].map(|secs| 1e3 * secs);
+                format!("The clock of the {whose} is {:.1} ms {late} against the tool's (90 %: {low:.1} to {high:.1} ms); re-tuned, no effect.", ms.abs())
+            })
+        };
+        self.retuned.iter().filter_map(clock).collect()
+    }
+
     /// Which episodes were left out, if any.
     #[must_use]
     pub fn left_out_sentence(&self) -> Option<String> {
@@ -175,8 +203,7 @@ impl Report {
     /// What a diagnosis says.
     #[must_use]
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
-        let count = diagnosis.heldout_counts.iter().sum::<usize>().max(1) as f64;
-        let [before, after] = heldout_errors(diagnosis);
+        let [before, after] = diagnosis.reported.errors();
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed).unwrap_or_default();
         widen(&mut samples, &diagnosis.model);
         let mut effects = effects(diagnosis, &samples, settings);
@@ -204,7 +231,7 @@ impl Report {
                 diagnosis.contact_gap.as_ref().and_then(ContactGap::next_experiment),
             ),
             confusion_set,
-            ranking: ranking(diagnosis, count),
+            ranking: ranking(diagnosis),
             located: diagnosis.located.clone(),
             remaining: diagnosis.remaining.clone(),
             description,
@@ -216,12 +243,14 @@ impl Report {
                 noise_floor: NOISE_FLOOR,
                 closed_fraction: if verdict == Verdict::None { 1.0 } else { closed_fraction(before, after) },
                 unit: "chi2 per sample",
-                episodes: diagnosis.heldout_episodes.clone(),
+                episodes: diagnosis.reported.episodes.clone(),
             },
             findings: diagnosis.findings.clone(),
             retuned: retuned(diagnosis, &samples),
             effects,
             evidence: diagnosis.evidence.clone(),
+            noise: diagnosis.noise.clone(),
+            split: diagnosis.split,
             seed: settings.seed,
             fold: settings.fold.map(|[part, parts]| [part + 1, parts]),
             left_out: diagnosis.left_out.clone(),
@@ -306,15 +335,16 @@ fn near_the_first<'a>(rivals: impl Iterator<Item = (&'a str, f64)>, named: Optio
     rivals.filter(|(_, gain)| best - gain < near).map(|(name, _)| name).collect()
 }
 
-fn ranking(diagnosis: &Diagnosis, count: f64) -> Vec<RankedEffect> {
+fn ranking(diagnosis: &Diagnosis) -> Vec<RankedEffect> {
     let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
     let mut rivals: Vec<&Rival> = round.rivals.iter().chain(round.passed_over_kinds()).collect();
     rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    let heldout = |kind| diagnosis.ranking.iter().find(|(other, _)| *other == kind).map_or(f64::NAN, |found| found.1);
     (rivals.into_iter())
         .map(|rival| RankedEffect {
             name: rival.kind().name(),
             log_evidence: rival.gain,
-            heldout: rival.heldout.squares.iter().sum::<f64>() / count,
+            heldout: heldout(rival.kind()),
         })
         .collect()
 }

@@ -40,8 +40,10 @@ const FAR: f64 = 100.0;
 pub(crate) struct Search<'a> {
     /// Episodes that models are fitted to.
     pub(crate) study: Study<'a>,
-    /// Those held out.
+    /// Those held out, by which models are chosen.
     pub(crate) kept: Study<'a>,
+    /// Those held out for the report; `None`: the same.
+    pub(crate) reported: Option<Study<'a>>,
     /// Those of the screening, with errors learnt where re-tuning alone leads.
     pub(crate) part: Study<'a>,
     /// What it may do.
@@ -58,9 +60,24 @@ impl Search<'_> {
     }
 
     /// Residuals of the held-out episodes.
-    pub(crate) fn heldout_residuals(&self, fit: &Fit) -> Stack {
+    fn heldout_residuals(&self, fit: &Fit) -> Stack {
         let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
         self.kept.white(&raw, fit.model.engine_errors(&fit.x))
+    }
+
+    /// Error of a kind in the held-out episodes, as a share of what it does there: root mean squares, both in its unit. 0 without such readings.
+    pub(crate) fn heldout_share(&self, raw: &[Vec<f64>], kind: Kind) -> f64 {
+        let (mut error, mut signal) = (0.0, 0.0);
+        for (index, raw) in self.kept.chosen.iter().zip(raw) {
+            let trial = &self.study.simulator.trials[*index];
+            let Some(does) = trial.signal(kind) else { continue };
+            let errors = trial.errors(raw);
+            let squares = errors.iter().filter(|(of, _)| *of == kind).map(|(_, error)| error * error);
+            let count = squares.clone().count();
+            error += squares.sum::<f64>() / count.max(1) as f64;
+            signal += does;
+        }
+        if signal > 0.0 { (error / signal).sqrt() } else { 0.0 }
     }
 
     /// Mean square of such residuals in each held-out episode, as far as they are of some kinds; of those episodes that have any.
@@ -77,6 +94,11 @@ impl Search<'_> {
             (count > 0).then(|| square / count as f64)
         };
         episodes.heldout.iter().filter_map(one).collect()
+    }
+
+    /// Held-out episodes of the report.
+    pub(crate) fn reported(&self) -> &Study<'_> {
+        self.reported.as_ref().unwrap_or(&self.kept)
     }
 
     /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out or another one
@@ -405,6 +427,8 @@ impl Search<'_> {
         let hypothesis = right.model.hypothesis(&right.x);
         self.study.learn_errors(&hypothesis);
         self.kept.learn_errors_as(&hypothesis, &self.study);
+        let study = &self.study;
+        self.reported.iter_mut().for_each(|reported| reported.learn_errors_as(&hypothesis, study));
     }
 
     /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.

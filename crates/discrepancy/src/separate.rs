@@ -26,6 +26,13 @@ const PAIRS: &[(&str, &str, &str)] = &[
         "stribeck_friction",
         "start from rest by a slow ramp, then stop slowly: Stribeck shows at the end of a slide too",
     ),
+    (
+        "force_delay",
+        "force_low_pass",
+        "knock on the object: a late force is as sharp as the knock, a slow one is rounded",
+    ),
+    ("force_delay", "actuation_delay", "look at when the object starts to move: a late force does not shift it"),
+    ("force_delay", "pose_delay", "compare with the tool's place at the first contact: only one of the two is late"),
     ("static_friction", "adhesion", "vary how long tool and object rest together, then pull away"),
     ("static_friction", "backlash", "vary how long tool and object rest together, then reverse slowly"),
     ("anisotropic_friction", "table_tilt", "push in eight directions: tilt has one period per turn, anisotropy two"),

@@ -1,5 +1,6 @@
 //! Hypotheses against measured episodes: residuals by simulation.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -10,6 +11,7 @@ use physics_model::{BodyState, EffectConfig, EffectKind};
 use rayon::prelude::*;
 
 use crate::cells::{Key, key};
+use crate::clock::{skewed, step};
 use crate::nominal::{Engine, Nominal};
 use crate::progress::Progress;
 use crate::trial::{Block, Trial, WHOLE};
@@ -49,6 +51,8 @@ pub struct Simulator<'a> {
     /// The episodes.
     pub trials: &'a [Trial],
     simulated: AtomicUsize,
+    /// Of each episode, what was compared last, with each clock a step away: that takes no simulation.
+    ahead: Vec<Mutex<Vec<Ahead>>>,
     /// Simulated episodes that all stages may come to, for those who wait.
     limit: usize,
     progress: &'a dyn Progress,
@@ -58,7 +62,8 @@ impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, simulated: AtomicUsize::new(0), limit: usize::MAX, progress: &() }
+        let ahead = trials.iter().map(|_| Mutex::default()).collect();
+        Self { nominal, trials, simulated: AtomicUsize::new(0), ahead, limit: usize::MAX, progress: &() }
     }
 
     /// Before the eyes of somebody who wants to know how far it is, of so many simulated episodes at most.
@@ -88,12 +93,44 @@ impl<'a> Simulator<'a> {
     /// Residuals of the episodes `chosen` (see [`Trial::residuals`]), in parallel; the order is that of `chosen`.
     #[must_use]
     pub fn residuals(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, chosen: &[usize]) -> Vec<Vec<f64>> {
-        chosen.par_iter().map(|index| self.episode(hypothesis, engine, nudge, &self.trials[*index])).collect()
+        chosen.par_iter().map(|index| self.episode(hypothesis, engine, nudge, *index)).collect()
     }
 
-    /// Simulated readings of an episode, the start first.
+    /// Whether the residuals of all episodes `chosen` are known: a clock differs from what was simulated last.
+    pub(crate) fn is_ahead(&self, hypothesis: &Hypothesis, chosen: &[usize]) -> bool {
+        self.nominal.clocks() > 0 && chosen.iter().all(|index| self.known(hypothesis, *index).is_some())
+    }
+
+    fn known(&self, hypothesis: &Hypothesis, index: usize) -> Option<Vec<f64>> {
+        let ahead = self.ahead[index].lock().ok()?;
+        ahead.iter().find(|known| known.hypothesis == *hypothesis).map(|known| known.residuals.clone())
+    }
+
+    /// Simulated readings of an episode, the start first, as their clocks stamp them.
     #[must_use]
     pub fn readings(
+        &self,
+        hypothesis: &Hypothesis,
+        engine: &Engine,
+        nudge: Nudge,
+        trial: &Trial,
+    ) -> (RigReading, Vec<RigReading>) {
+        let (first, readings) = self.run(hypothesis, engine, nudge, trial);
+        let readings = self.stamped(hypothesis, &first, readings);
+        (first, readings)
+    }
+
+    fn stamped(&self, hypothesis: &Hypothesis, first: &RigReading, readings: Vec<RigReading>) -> Vec<RigReading> {
+        let effects = self.nominal.effects.iter().chain(&hypothesis.effects);
+        let skews_secs = self.nominal.skews_secs(&hypothesis.z, effects);
+        if skews_secs == [0.0; 2] || readings.is_empty() {
+            return readings;
+        }
+        skewed(&readings, first, skews_secs, self.nominal.header().period_secs)
+    }
+
+    /// The same by a clock without skew.
+    fn run(
         &self,
         hypothesis: &Hypothesis,
         engine: &Engine,
@@ -147,10 +184,33 @@ impl<'a> Simulator<'a> {
         chosen.par_iter().map(one).collect()
     }
 
-    fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, trial: &Trial) -> Vec<f64> {
-        let (first, readings) = self.readings(hypothesis, engine, nudge, trial);
-        trial.residuals(&first, &readings)
+    fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, index: usize) -> Vec<f64> {
+        let (trial, clocks) = (&self.trials[index], self.nominal.clocks());
+        let plain = clocks > 0 && nudge == Nudge::default() && *engine == self.nominal.engine();
+        if plain && let Some(known) = self.known(hypothesis, index) {
+            return known;
+        }
+        let (first, readings) = self.run(hypothesis, engine, nudge, trial);
+        let residuals = |hypothesis: &Hypothesis, readings: Vec<RigReading>| {
+            trial.residuals(&first, &self.stamped(hypothesis, &first, readings))
+        };
+        if plain && let Ok(mut ahead) = self.ahead[index].lock() {
+            ahead.clear();
+            ahead.extend((0..clocks).map(|clock| {
+                let mut hypothesis = hypothesis.clone();
+                hypothesis.z[clock] += step(hypothesis.z[clock]);
+                Ahead { residuals: residuals(&hypothesis, readings.clone()), hypothesis }
+            }));
+        }
+        residuals(hypothesis, readings)
     }
+}
+
+/// Residuals of an episode that were not asked for yet.
+#[derive(Debug)]
+struct Ahead {
+    hypothesis: Hypothesis,
+    residuals: Vec<f64>,
 }
 
 fn nudged(start: &BodyState, stddev: &[f64; 4], nudge: Nudge) -> BodyState {

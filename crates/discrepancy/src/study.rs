@@ -108,7 +108,9 @@ impl<'a> Study<'a> {
     /// Residuals of all its episodes, standardised but not white.
     #[must_use]
     pub fn raw(&self, hypothesis: &Hypothesis) -> Vec<Vec<f64>> {
-        self.charge();
+        if !self.simulator.is_ahead(hypothesis, &self.chosen) {
+            self.charge();
+        }
         self.simulator.residuals(hypothesis, &self.engine, Nudge::default(), &self.chosen)
     }
 

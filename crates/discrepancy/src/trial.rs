@@ -306,6 +306,22 @@ impl Trial {
         residuals
     }
 
+    /// Mean square of what the readings of a kind do in the episode, in the square of its unit: of places how far they are from the first, of others how
+    /// large they are. `None` without such readings.
+    pub(crate) fn signal(&self, kind: Kind) -> Option<f64> {
+        let place = matches!(kind, Kind::ObjectPosition | Kind::ToolPosition | Kind::JointPosition);
+        let (mut square, mut count) = (0.0, 0_usize);
+        for scalar in self.scalars.iter().filter(|scalar| scalar.kind == kind) {
+            let mut read = scalar.values.iter().flatten();
+            let from = if place { read.clone().next().copied().unwrap_or(0.0) } else { 0.0 };
+            read.by_ref().for_each(|value| {
+                square += (value - from).powi(2);
+                count += 1;
+            });
+        }
+        (count > 0).then(|| square / count as f64)
+    }
+
     /// What standardised residuals are in the unit of their channel: the mean of (measured − simulated) over each block.
     pub(crate) fn errors(&self, residuals: &[f64]) -> Vec<(Kind, f64)> {
         let present = |block: &Block| {

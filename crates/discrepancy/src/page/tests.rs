@@ -1,7 +1,9 @@
 use super::page;
 use crate::evidence::{BINS, ChannelError, Course, Evidence, LAGS, Path, Residuals};
 use crate::locate::Cell;
+use crate::noise::{SensorNoise, Source};
 use crate::report::{Heldout, NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
+use crate::split::Split;
 use crate::terms::{Coefficient, FoundTerm, LackingForce};
 use crate::trial::{Kind, Phase};
 
@@ -106,6 +108,14 @@ fn report(verdict: Verdict) -> Report {
         }],
         evidence: evidence(),
         next_experiment: "Push in eight directions.".into(),
+        noise: vec![SensorNoise {
+            channel: Kind::ObjectPosition,
+            unit: "m",
+            stddev: 5e-4,
+            source: Source::Estimated,
+            scatter: Some(5e-4),
+        }],
+        split: Split { fitted: 28, choosing: 6, reported: 6, shared: false },
         seed: 1,
         fold: None,
         left_out: Vec::new(),

@@ -112,6 +112,7 @@ catalogue! {
     ForceGain: "The force sensor has another gain.",
     ForceLowPass: "The force sensor is slow.",
     ForceSaturation: "The force sensor has an end of its range.",
+    ForceDelay: "Forces are read late.",
     PoseOffset: "Poses are read beside where they are.",
     PoseDelay: "Poses are read late.",
     PoseScale: "Distances are read longer or shorter.",
