@@ -25,6 +25,8 @@ pub mod draw;
 pub mod folder;
 pub mod gaussian_process;
 pub mod generate;
+pub mod learn;
+pub mod logistic;
 pub mod plan;
 pub mod recording;
 pub mod rehearsal;

@@ -10,6 +10,7 @@ use crate::budget::Budget;
 use crate::candidate::{Candidate, Context, candidates};
 use crate::context::context;
 use crate::driven::driven;
+use crate::decision::{Decision, Probabilities};
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::findings::Findings;
@@ -33,7 +34,7 @@ use crate::terms::{LackingForce, lacking_force};
 use crate::touch::{ContactGap, contact_gap};
 use crate::trial::groups;
 use crate::units::Units;
-use crate::verdict::{comes_near, verdict};
+use crate::verdict::{Decided, decide};
 
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
@@ -74,19 +75,11 @@ pub struct Settings {
     pub most: usize,
     /// No fit of an effect begins a simulation that would end above this many; what is decided, drawn and told of the last ones adds up to 160, and what is lacking is looked at in 20 more.
     pub limit: usize,
-    /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story. Of the
-    /// fitted episodes that are above it before anything is named, what is named has to close half of a typical one's gap, too.
+    /// Mean square of the residuals of an episode, on average over all but the worst, above which a second effect is looked for at once.
     pub unexplained: f64,
-    /// The same of the held-out ones before anything is named, from which on what is named has to close half of the gap of a typical one;
-    /// a body in the way, which shows where it is met, has not.
-    pub gap: f64,
-    /// The same of a single held-out one above which nothing is not the whole story either.
-    pub odd: f64,
     /// Chance that some channel in some phase would stand out as much under a right model, below which another effect is looked for even
-    /// if none promises enough; above it episodes with gaps are odd ones.
+    /// if none promises enough.
     pub another: f64,
-    /// Chance that some channel in some phase would stand out as much under a right model, below which what is left is no chance.
-    pub left_by_chance: f64,
 }
 
 impl Settings {
@@ -133,14 +126,8 @@ impl Default for Settings {
             most: 4300,
             limit: 4800,
             unexplained: 1.4,
-            gap: 1.1,
-            // At most 1.6 in the 38 logs without an effect of seeds 101, 103 and 106.
-            odd: 10.0,
             // Seed 7: a pair's second effect stands out at 0.002 or less, but for one of 11; what two spurious ones were found for, at 0.14 and 0.87.
             another: 0.05,
-            // Of 44 logs of seed 22 eight have an effect outside the catalogue: at most 0.0003. Of the others those that close less than nine tenths of a gap
-            // have at least 0.02, of ten logs of MuJoCo without an effect 0.06.
-            left_by_chance: 0.005,
         }
     }
 }
@@ -171,6 +158,10 @@ pub struct Diagnosis {
     pub split: Split,
     /// The verdict.
     pub verdict: Verdict,
+    /// Probabilities that the best effect of the search is right, that nothing is missing, and that something else is.
+    pub probabilities: Probabilities,
+    /// That each effect of the accepted model is right.
+    pub confidences: Vec<f64>,
     /// Why it is `unknown`.
     pub reason: Option<String>,
     /// Effects that the nominal model had before.
@@ -209,30 +200,11 @@ impl Diagnosis {
         self.model.model.hypothesis(x).effects.iter().map(|effect| self.units.effect(effect)).collect()
     }
 
-    /// Says what it is, and of a gap that nothing explains what it follows.
-    fn judge(&mut self, study: &Study, settings: &Settings) {
-        (self.verdict, self.reason) = verdict(self, settings);
-        if self.verdict == Verdict::Unknown {
-            let worst = worst(study.simulator, &study.chosen, &self.nominal);
-            self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst, &self.units);
-            self.contact_gap = contact_gap(&worst).map(|gap| gap.in_units(&self.units));
-            if !self.model.model.parts.is_empty() && !comes_near(self) {
-                self.without_effects();
-            }
-        }
-    }
-
-    /// Takes back effects that explain next to nothing: nobody should plan with them.
-    fn without_effects(&mut self) {
-        let tried: Vec<&str> = self.model.model.parts.iter().map(|part| part.kind().name()).collect();
-        self.reason =
-            self.reason.take().map(|reason| format!("{reason} (the best effect that was tried: {})", tried.join(", ")));
-        self.model = self.nominal.clone();
-        self.heldout[1] = self.heldout[0].clone();
-        self.heldout_episodes.iter_mut().for_each(|(_, before, after)| *after = *before);
-        self.reported.take_back();
-        self.remaining = self.located.clone();
-        self.evidence.take_back();
+    /// Says of a gap that nothing explains what it follows.
+    fn describe(&mut self, study: &Study) {
+        let worst = worst(study.simulator, &study.chosen, &self.nominal);
+        self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst, &self.units);
+        self.contact_gap = contact_gap(&worst).map(|gap| gap.in_units(&self.units));
     }
 }
 
@@ -326,10 +298,10 @@ fn no_numbers(log: &str) -> Error {
     Error::Unfit { log: log.into(), reason }
 }
 
-/// From what a search accepted and compared, and what that leaves where it is known, to a verdict.
+/// From what a search accepted and compared to a verdict.
 fn conclude(
     search: &Search,
-    (accepted, rounds, remaining): (Fit, Vec<Round>, Option<Vec<Cell>>),
+    (accepted, rounds): (Fit, Vec<Round>),
     episodes: Episodes,
     about: About,
 ) -> Result<Diagnosis, Error> {
@@ -340,7 +312,12 @@ fn conclude(
         let lead = round.rivals.first().filter(|rival| !rival.heldout.costs.is_empty())?;
         Some(Findings::of(search, round, lead, &episodes))
     };
-    let findings = rounds.iter().filter_map(lead).collect();
+    let mut findings: Vec<Findings> = rounds.iter().filter_map(lead).collect();
+    if rounds[0].rivals.is_empty() || findings.is_empty() {
+        findings.insert(0, Findings::of_nothing(search, &null, &episodes));
+    }
+    let Decided { verdict, probabilities, confidences, model: accepted, reason } =
+        decide(Decision::shipped(), accepted, &rounds, &findings);
     let choosing = HeldOut::new(&search.kept, [&null, &accepted]);
     let reported = search.reported.as_ref().map(|study| HeldOut::new(study, [&null, &accepted]));
     let reported = reported.unwrap_or_else(|| choosing.clone());
@@ -352,10 +329,10 @@ fn conclude(
         episodes.fitted.iter().map(fitted_mean).chain(choosing.episodes.iter().map(|(_, _, after)| *after)).collect();
     let chosen = &search.study.chosen;
     let located = locate(simulator, chosen, &null, settings.seed);
-    let remaining = match remaining {
-        Some(cells) => cells,
-        None if accepted.model.parts.is_empty() => located.clone(),
-        None => locate(simulator, chosen, &accepted, settings.seed),
+    let remaining = if accepted.model.parts.is_empty() {
+        located.clone()
+    } else {
+        locate(simulator, chosen, &accepted, settings.seed)
     };
     let mut diagnosis = Diagnosis {
         located,
@@ -372,8 +349,10 @@ fn conclude(
         reported,
         findings,
         mean_squares,
-        verdict: Verdict::None,
-        reason: None,
+        verdict,
+        probabilities,
+        confidences,
+        reason,
         effects_in_model: simulator.nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
         tunables: about.tunables,
         units: about.units,
@@ -385,7 +364,9 @@ fn conclude(
         fitted_ids: episodes.fitted.iter().map(|group| simulator.trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };
-    diagnosis.judge(&search.study, settings);
+    if verdict == Verdict::Unknown {
+        diagnosis.describe(&search.study);
+    }
     diagnosis.rollouts = simulator.rollouts();
     Ok(diagnosis)
 }

@@ -96,12 +96,6 @@ pub struct Residuals {
 }
 
 impl Evidence {
-    /// After as before: no effect is accepted.
-    pub(crate) fn take_back(&mut self) {
-        self.path.after = self.path.before.clone();
-        if let Some(course) = &mut self.course {
-            course.after = course.before.clone();
-        }
         self.residuals.histogram[1] = self.residuals.histogram[0].clone();
         self.residuals.autocorrelation[1] = self.residuals.autocorrelation[0].clone();
         for error in &mut self.errors {

@@ -87,6 +87,37 @@ impl Findings {
     }
 }
 
+impl Findings {
+    /// Of a search that found nothing to try.
+    pub(crate) fn of_nothing(search: &Search, null: &Fit, episodes: &Episodes) -> Self {
+        let raw = search.kept.raw(&null.model.hypothesis(&null.x));
+        let white = search.kept.white(&raw, null.model.engine_errors(&null.x));
+        let error = |of: &dyn Fn(Kind) -> bool| {
+            let errors = search.heldout_errors(&white, episodes, of);
+            if errors.is_empty() { 1.0 } else { trimmed_mean(errors) }
+        };
+        let all = error(&|_| true);
+        let [motion, force] =
+            [Kind::ObjectPosition, Kind::WristForce].map(|kind| [search.heldout_share(&raw, kind); 2]);
+        Self {
+            effect: String::new(),
+            log_evidence: 0.0,
+            margin: 0.0,
+            steadiness: 0.0,
+            heldout_steadiness: 0.0,
+            drop: 0.0,
+            before: all,
+            after: all,
+            motion_after: error(&is_motion),
+            force_after: error(&is_force),
+            motion_share: motion,
+            force_share: force,
+            size: 0.0,
+            episodes: [episodes.fitted.len(), episodes.heldout.len()],
+        }
+    }
+}
+
 fn is_motion(kind: Kind) -> bool {
     matches!(kind, Kind::ObjectPosition | Kind::ObjectOrientation | Kind::ObjectVelocity | Kind::ObjectSpin)
 }

@@ -40,6 +40,7 @@ mod cells;
 mod chain;
 mod clock;
 mod context;
+pub mod decision;
 pub mod diagnosis;
 mod driven;
 mod error;

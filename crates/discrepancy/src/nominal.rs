@@ -27,6 +27,13 @@ const THROWN_FREQUENCY_HZ: f64 = 200.0;
 /// Critically damped: what bounces back is said by the restitution.
 const THROWN_DAMPING_RATIO: f64 = 1.0;
 
+/// Standard deviation of the logarithm of a contact's natural frequency and damping ratio: a factor of two. MuJoCo's default contacts are softer than
+/// ours by about as much, those of Bullet and of real tables stiffer.
+const CONTACT_SPREAD: f64 = 0.7;
+
+/// How far contacts reach, in these: beyond a factor of eight no contact is one.
+const CONTACT_RANGE: f64 = 3.0;
+
 /// How exactly the engine solves. Variants of it show how far its answers can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Engine {
@@ -105,12 +112,15 @@ enum Place {
     Inertia(usize),
     Restitution,
     Clock(Clock),
+    ContactFrequency,
+    ContactDamping,
 }
 
 impl Place {
     fn unit(self) -> &'static str {
         match self {
-            Self::TableFriction | Self::ToolFriction | Self::Restitution => "",
+            Self::TableFriction | Self::ToolFriction | Self::Restitution | Self::ContactDamping => "",
+            Self::ContactFrequency => "Hz",
             Self::Clock(_) => "s",
             Self::TableHeight | Self::Com(_) | Self::Size(_) => "m",
             Self::Mass => "kg",
@@ -200,7 +210,24 @@ impl Nominal {
         if let Some(restitution) = object.restitution {
             add("object.restitution".into(), restitution, true, Place::Restitution);
         }
+        all.extend(self.contact());
         all
+    }
+
+    /// How stiff contacts are, and how much they damp: no log says it, and engines differ by factors.
+    fn contact(&self) -> [Tunable; 2] {
+        let engine = self.engine();
+        let tunable = |key: &str, mean: f64, place| Tunable {
+            key: key.into(),
+            mean,
+            stddev: CONTACT_SPREAD * mean,
+            positive: true,
+            place,
+        };
+        [
+            tunable("contact.frequency_hz", engine.contact_frequency_hz, Place::ContactFrequency),
+            tunable("contact.damping_ratio", engine.contact_damping_ratio, Place::ContactDamping),
+        ]
     }
 
     /// The log's header.
@@ -292,6 +319,13 @@ impl Nominal {
         }
     }
 
+    /// A tunable's value in its prior mean; 1 where re-tuning may not change it.
+    fn factor(&self, z: &[f64], place: Place) -> f64 {
+        let index = self.tunables.iter().position(|tunable| tunable.place == place);
+        let value = |index: usize| self.tunables[index].value(z[index].clamp(-CONTACT_RANGE, CONTACT_RANGE));
+        index.map_or(1.0, |index| value(index) / self.tunables[index].mean)
+    }
+
     /// The rig with coordinates `z`.
     #[must_use]
     pub fn rig(&self, z: &[f64], engine: &Engine) -> Rig {
@@ -305,8 +339,8 @@ impl Nominal {
             control_period_secs: header.period_secs / f64::from(steps),
             control_steps: 1,
             solver_iterations: engine.solver_iterations,
-            contact_frequency_hz: engine.contact_frequency_hz,
-            contact_damping_ratio: engine.contact_damping_ratio,
+            contact_frequency_hz: self.factor(z, Place::ContactFrequency) * engine.contact_frequency_hz,
+            contact_damping_ratio: self.factor(z, Place::ContactDamping) * engine.contact_damping_ratio,
             table_height_m: self.value(z, Place::TableHeight, header.table.height_m),
             gravity_mps2: header.gravity_mps2,
             tool_friction,

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::diagnosis::{Diagnosis, Settings};
+use crate::decision::Probabilities;
 use crate::evidence::Evidence;
 use crate::findings::Findings;
 use crate::interval::{bootstrap, middle_90, widen};
@@ -35,8 +36,7 @@ pub struct NamedEffect {
     pub name: &'static str,
     /// What it does, in a line.
     pub description: &'static str,
-    /// Probability among the fitted rivals and the nominal model, of tempered evidences ([`Settings::temperature`]); of a further effect over nothing by more than
-    /// what errors of the engine make beside those before it. At most one half where the verdict is `unknown`.
+    /// Probability that it is right ([`crate::decision`]): above one half where the verdict is `effect`.
     pub confidence: f64,
     /// Gain in ln evidence over the model without it; of one of several of what is thrown what the episodes of the screening say for all.
     pub log_evidence: f64,
@@ -128,6 +128,8 @@ pub struct Report {
     pub contact_gap: Option<ContactGap>,
     /// Held-out comparison.
     pub heldout: Heldout,
+    /// Probabilities that the best effect of the search is right, that nothing is missing, and that something else is.
+    pub probabilities: Probabilities,
     /// What speaks for the best effect of each round of the search: what the decision is made of.
     pub findings: Vec<Findings>,
     /// The nominal model, re-tuned.
@@ -157,13 +159,6 @@ pub struct Report {
     /// Duration, s.
     pub seconds: f64,
 }
-
-/// Confidence, at most, in what does not explain the gap: something else is at least as likely.
-const NO_LIKELIER: f64 = 0.5;
-
-/// What a further effect gains, as a share of what those before it did, that errors of the engine make of nothing: ln evidence of it over nothing is divided by this.
-/// Of seeds 17 to 20 of the benchmark ten further names of single effects that were wrong gained 0.6 to 13 %, 57 right ones of pairs 1.5 % and more, 17 of them less than 10 %.
-const SECOND_ERROR: f64 = 0.03;
 
 impl Report {
     /// Which noise was used.
@@ -206,12 +201,9 @@ impl Report {
         let [before, after] = diagnosis.reported.errors();
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed).unwrap_or_default();
         widen(&mut samples, &diagnosis.model);
-        let mut effects = effects(diagnosis, &samples, settings);
+        let effects = effects(diagnosis, &samples);
         let verdict = diagnosis.verdict;
         let unknown = verdict == Verdict::Unknown;
-        if unknown {
-            effects.iter_mut().for_each(|effect| effect.confidence = effect.confidence.min(NO_LIKELIER));
-        }
         let confusion_set = confusion_set(diagnosis, settings, &effects);
         let summary = summary(verdict, &effects, before, after);
         let description = unknown.then(|| describe(diagnosis));
@@ -245,6 +237,7 @@ impl Report {
                 unit: "chi2 per sample",
                 episodes: diagnosis.reported.episodes.clone(),
             },
+            probabilities: diagnosis.probabilities,
             findings: diagnosis.findings.clone(),
             retuned: retuned(diagnosis, &samples),
             effects,
@@ -260,21 +253,14 @@ impl Report {
     }
 }
 
-fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> Vec<NamedEffect> {
+fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
     let model = &diagnosis.model.model;
     let fitted = diagnosis.effects(&diagnosis.model.x);
     let resampled: Vec<_> = samples.iter().map(|x| diagnosis.effects(x)).collect();
-    let mut explained = 0.0;
     (model.parts.iter().enumerate())
         .map(|(place, part)| {
             let kind = part.kind();
             let round = &diagnosis.rounds[place];
-            let gain = round.rivals[0].gain;
-            let noise = settings.temperature.max(SECOND_ERROR * explained);
-            explained += gain;
-            let passed = round.passed_over();
-            let passed = passed.iter().map(|(_, more)| gain + more);
-            let others = round.rivals.iter().skip(1).map(|rival| rival.gain).chain(passed);
             let parameters = (part.coordinates.iter())
                 .map(|coordinate| {
                     let parameter = &kind.parameters()[coordinate.index];
@@ -291,19 +277,12 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>], settings: &Settings) -> 
             NamedEffect {
                 name: kind.name(),
                 description: kind.description(),
-                confidence: confidence(gain, others, settings.temperature, noise),
-                log_evidence: gain,
+                confidence: diagnosis.confidences[place],
+                log_evidence: round.rivals[0].gain,
                 parameters,
             }
         })
         .collect()
-}
-
-/// Probability of what gains so much among its rivals, of these gains, and nothing; equal prior odds, ln evidences divided by the temperature, those over
-/// nothing by `noise`.
-fn confidence(gain: f64, others: impl Iterator<Item = f64>, temperature: f64, noise: f64) -> f64 {
-    let odds = |other: f64| ((other - gain) / temperature).exp();
-    1.0 / (1.0 + others.map(odds).sum::<f64>() + (-gain / noise).exp())
 }
 
 /// A key without the unit at its end.
@@ -426,16 +405,5 @@ mod tests {
         // A loss is nearer to nothing than to a name.
         assert_eq!(near_the_first(rivals.into_iter().skip(2), None, 15.0), ["adhesion"]);
         assert!(near_the_first(rivals.into_iter().skip(3), None, 15.0).is_empty());
-    }
-
-    #[test]
-    fn confidence_is_a_tempered_probability() {
-        // Alone with nothing, 10 ahead: odds of e² to 1; a rival beside it as good halves it.
-        let two = 2.0_f64.exp();
-        assert!((confidence(10.0, [].into_iter(), 5.0, 5.0) - two / (two + 1.0)).abs() < 1e-12);
-        assert!((confidence(1e4, [1e4].into_iter(), 5.0, 5.0) - 0.5).abs() < 1e-12);
-        assert!((confidence(1e4, [1e4 - 5.0 * 3.0_f64.ln()].into_iter(), 5.0, 5.0) - 0.75).abs() < 1e-9);
-        // Beside something that gained 10 000 a gain of 200 may be an error of the engine.
-        assert!((confidence(200.0, [].into_iter(), 5.0, 300.0) - 0.66).abs() < 0.01);
     }
 }

@@ -150,7 +150,7 @@ pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
         let variant = promise.candidate.variant();
         let kind = variant.0;
         let before = variants.iter().filter(|other| **other == variant).count();
-        let several = matches!(kind, K::FrictionPatch | K::ContactCompliance | K::Restitution | K::Adhesion);
+        let several = matches!(kind, K::FrictionPatch | K::Restitution | K::Adhesion);
         let most = if several || promise.candidate.begin.is_some() { 2 } else { 1 };
         if before < most && (before > 0 || list.len() < count) {
             variants.push(variant);

@@ -102,19 +102,19 @@ impl Search<'_> {
     }
 
     /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out or another one
-    /// promises enough; the model with them, what was compared, and what the model leaves where that is known.
+    /// promises enough; the model with them, and what was compared.
     pub(crate) fn effects(
         &mut self,
         screening: &Screening,
         null: &Fit,
         episodes: &Episodes,
-    ) -> (Fit, Vec<Round>, Option<Vec<Cell>>) {
+    ) -> (Fit, Vec<Round>) {
         let settings = self.settings;
-        let (mut accepted, mut rounds, mut explained, mut remaining) = (null.clone(), Vec::new(), 0.0, None);
+        let (mut accepted, mut rounds, mut explained) = (null.clone(), Vec::new(), 0.0);
         let within = |search: &Self| search.study.has_rounds();
         let mut links = if settings.effects > 2 { self.chain(screening, null) } else { Vec::new() };
         if let Some((accepted, rounds)) = self.together(screening, null, &links, episodes) {
-            return (accepted, rounds, None);
+            return (accepted, rounds);
         }
         links.truncate(1);
         while rounds.is_empty() || (accepted.model.parts.len() < settings.effects && within(self)) {
@@ -134,7 +134,6 @@ impl Search<'_> {
             explained += round.rivals.first().map_or(0.0, |best| best.gain);
             rounds.push(round);
             if !found {
-                remaining = None;
                 break;
             }
             // A third one is worth more than to ask which two it was.
@@ -146,7 +145,6 @@ impl Search<'_> {
             }
             let cells = self.left(&accepted);
             let another = self.stands_out(&cells) || self.promised(screening, &accepted) > self.asked(explained).least;
-            remaining = Some(cells);
             if !another {
                 break;
             }
@@ -159,9 +157,8 @@ impl Search<'_> {
             self.compare(screening, first);
             let found = self.choose(first, episodes, 0.0);
             accepted = first.best(found).clone();
-            remaining = None;
         }
-        (accepted, rounds, remaining)
+        (accepted, rounds)
     }
 
     /// Drops the rivals before the best one that convinces beside effects that gained so much, and says whether one does.

@@ -160,12 +160,6 @@ impl HeldOut {
         let count = self.counts.iter().sum::<usize>().max(1) as f64;
         self.sums.each_ref().map(|sums| sums.iter().sum::<f64>() / count)
     }
-
-    /// After as before: no effect is accepted.
-    pub(crate) fn take_back(&mut self) {
-        self.sums[1] = self.sums[0].clone();
-        self.episodes.iter_mut().for_each(|(_, before, after)| *after = *before);
-    }
 }
 
 /// Sums of squares of the episodes of a study under a model.

@@ -33,9 +33,6 @@ pub struct Study<'a> {
 
 /// Standard deviation of the start's error, in those of what is known of it, and of an error of the solver, in differences of the variants below.
 const ERROR_SCALE: f64 = 1.5;
-/// How much stiffer contacts may be, and less damped: one standard deviation. What is much softer than the model shall be named.
-const STIFFER: f64 = 1.5;
-
 /// Slip below which a tool may let go. How much of a push it lifts or presses down where nothing slips sideways is indeterminate: an engine keeps what
 /// the first touch left for good, another relaxes it.
 const LETS_GO_MPS: f64 = 0.002;
@@ -52,8 +49,6 @@ fn variants(engine: &Engine, has_tool: bool) -> Vec<(Engine, f64)> {
         (Engine { refinement: 2 * engine.refinement, ..*engine }, ERROR_SCALE),
         (Engine { refinement: 3 * engine.refinement, solver_iterations: 2, ..*engine }, ERROR_SCALE),
         (Engine { solver_iterations: 2 * engine.solver_iterations, ..*engine }, ERROR_SCALE),
-        (Engine { contact_frequency_hz: STIFFER * engine.contact_frequency_hz, ..*engine }, 1.0),
-        (Engine { contact_damping_ratio: engine.contact_damping_ratio / STIFFER, ..*engine }, 1.0),
     ];
     if has_tool {
         variants.push((Engine { on_points: !engine.on_points, ..*engine }, ERROR_SCALE));

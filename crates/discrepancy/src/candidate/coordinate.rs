@@ -25,7 +25,6 @@ fn left_alone(kind: EffectKind, index: usize, context: &Context) -> bool {
     match kind {
         // Where a payload's centre is shows in torques alone.
         EffectKind::WristPayload => index > 0 && !(context.wrist_torques || context.joint_torques),
-        EffectKind::ContactCompliance => index == 1,
         // What is pushed stays upright, where the height of its centre hardly shows; of a sphere it does, which stays where it is in the table's frame.
         EffectKind::ComOffset => index == 2 && context.tool && context.theta.object.shape != ObjectShape::Sphere,
         _ => false,

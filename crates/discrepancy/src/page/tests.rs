@@ -63,6 +63,7 @@ fn report(verdict: Verdict) -> Report {
     let named = verdict == Verdict::Effect;
     Report {
         findings: Vec::new(),
+        probabilities: crate::decision::Probabilities { effect: 0.97, none: 0.01, unknown: 0.02 },
         version: 1,
         verdict,
         summary: "A sentence.".into(),

@@ -1,0 +1,291 @@
+//! How a diagnosis decides, learnt from logs of other engines: answers of `diagnose` beside the truth of each log.
+//!
+//! A folder of logs holds `log-NNN/` and `truth/log-NNN.json`, as `tests/peers/worlds/make_logs.py` writes them; answers lie in `ANSWERS/FOLDER/log-NNN/report.json`.
+//! What is learnt is judged on the engine that was left out, each in turn.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use discrepancy::decision::{Decision, FEATURES, Probabilities, features};
+use discrepancy::findings::Findings;
+use serde::{Deserialize, Serialize};
+
+use crate::logistic;
+
+/// Prior variance of a weight of a standardised feature.
+const VARIANCE: f64 = 1.0;
+/// A mean square difference, in those of noise, by which an effect changes its episodes, below which nothing shows.
+const DETECTABLE: f64 = 3.0;
+/// A clock that is late by more than this has the name of a delay, s.
+const LATE_SECS: f64 = 0.005;
+
+/// What a log hides.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Truth {
+    /// Engine that made it.
+    pub engine: String,
+    /// Its contacts.
+    pub variant: String,
+    /// Seed.
+    pub seed: u64,
+    /// Effects of the catalogue.
+    pub effects: Vec<Named>,
+    /// Effects that the catalogue has not.
+    pub outside: Vec<serde_json::Value>,
+    /// Mean square of what all of these change, in that of noise.
+    pub detectable: Option<f64>,
+    /// Whether its actions were chosen to tell effects apart.
+    pub designed: bool,
+    /// By how much the object's clock is late, s.
+    #[serde(default)]
+    pub skew_s: f64,
+}
+
+/// A hidden effect.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Named {
+    /// Name.
+    pub name: String,
+    /// Values by the keys of its parameters.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// What a right answer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// An effect of the catalogue.
+    Effect,
+    /// Nothing.
+    None,
+    /// Something that the catalogue has not.
+    Outside,
+}
+
+impl Truth {
+    /// What a right answer is. An effect that changes less than noise is none.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        let shows = self.detectable.is_some_and(|size| size >= DETECTABLE);
+        match (self.effects.is_empty(), self.outside.is_empty()) {
+            (_, false) if shows => Kind::Outside,
+            (false, true) if shows => Kind::Effect,
+            _ => Kind::None,
+        }
+    }
+
+    /// Whether a name is right: one of what is hidden, or a delay of a clock that is late.
+    #[must_use]
+    pub fn names(&self, name: &str) -> bool {
+        let late = name == "pose_delay" && self.skew_s > LATE_SECS;
+        late || self.effects.iter().any(|effect| effect.name == name)
+    }
+}
+
+/// What of an answer is read.
+#[derive(Clone, Debug, Deserialize)]
+struct Answer {
+    findings: Vec<Findings>,
+    effects: Vec<Answered>,
+    rollouts: u64,
+    seconds: f64,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Answered {
+    name: String,
+    parameters: Vec<Value>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Value {
+    key: String,
+    interval90: [f64; 2],
+}
+
+/// A log with its answer.
+#[derive(Clone, Debug)]
+pub struct Example {
+    /// Folder and name.
+    pub log: String,
+    /// What it hides.
+    pub truth: Truth,
+    /// What speaks for the best effect of the search.
+    pub findings: Findings,
+    /// Whether the 90 % interval of each parameter of a rightly named effect holds its value.
+    pub covered: Vec<bool>,
+    /// Simulated episodes.
+    pub rollouts: u64,
+    /// Duration, s.
+    pub seconds: f64,
+}
+
+impl Example {
+    /// The class that it teaches: 0, the best effect is right; 1, nothing is missing; 2, something else is.
+    fn label(&self) -> usize {
+        match self.truth.kind() {
+            Kind::Effect if self.truth.names(&self.findings.effect) => 0,
+            Kind::None if self.truth.names(&self.findings.effect) && self.truth.skew_s > LATE_SECS => 0,
+            Kind::None => 1,
+            Kind::Effect | Kind::Outside => 2,
+        }
+    }
+}
+
+/// Reads the logs of `folder` that have an answer in `answers`.
+///
+/// # Errors
+///
+/// Where a file cannot be read.
+pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
+    let name = folder.file_name().context("expected the name of a folder of logs")?;
+    let truths = folder.join("truth");
+    let listed = std::fs::read_dir(&truths).with_context(|| format!("cannot read {}", truths.display()))?;
+    let mut paths: Vec<_> = listed.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
+    paths.sort();
+    let mut examples = Vec::new();
+    for path in paths {
+        let Some(log) = path.file_stem() else { continue };
+        let report = answers.join(name).join(log).join("report.json");
+        if !report.exists() {
+            continue;
+        }
+        let text = |path: &Path| std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()));
+        let parse = |path: &Path| format!("{}: expected what this version writes", path.display());
+        let truth: Truth = serde_json::from_str(&text(&path)?).with_context(|| parse(&path))?;
+        let answer: Answer = serde_json::from_str(&text(&report)?).with_context(|| parse(&report))?;
+        let Some(findings) = answer.findings.into_iter().next() else { continue };
+        let covered = (answer.effects.iter())
+            .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
+            .flat_map(|(named, effect)| {
+                let holds = |value: &Value| {
+                    let [low, high] = value.interval90;
+                    effect.parameters.get(&value.key).map(|truth| (low..=high).contains(truth))
+                };
+                named.parameters.iter().filter_map(holds).collect::<Vec<_>>()
+            })
+            .collect();
+        let log = format!("{}/{}", name.display(), log.display());
+        examples.push(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds });
+    }
+    Ok(examples)
+}
+
+/// The regression that examples teach.
+#[must_use]
+pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
+    let rows: Vec<[f64; FEATURES.len()]> = examples.iter().map(|example| features(&example.findings)).collect();
+    let n = rows.len().max(1) as f64;
+    let scale = |index: usize| {
+        let mean = rows.iter().map(|row| row[index]).sum::<f64>() / n;
+        let variance = rows.iter().map(|row| (row[index] - mean).powi(2)).sum::<f64>() / n;
+        // What all examples have in common says nothing.
+        (FEATURES[index].to_string(), mean, variance.sqrt().max(1e-6))
+    };
+    let scales: Vec<(String, f64, f64)> = (0..FEATURES.len()).map(scale).collect();
+    let standard = |row: &[f64; FEATURES.len()]| -> Vec<f64> {
+        row.iter().zip(&scales).map(|(value, (_, mean, stddev))| (value - mean) / stddev).collect()
+    };
+    let standard: Vec<Vec<f64>> = rows.iter().map(standard).collect();
+    let labels: Vec<usize> = examples.iter().map(|example| example.label()).collect();
+    let mut classes = logistic::fit(&standard, &labels, 3, VARIANCE).into_iter();
+    let mut next = || classes.next().unwrap_or_default();
+    Decision { provenance, features: scales, classes: [next(), next(), next()] }
+}
+
+/// Every example with the probabilities of what the other engines teach.
+#[must_use]
+pub fn leave_one_engine_out(examples: &[Example]) -> Vec<(&Example, Probabilities)> {
+    let mut engines: Vec<&str> = examples.iter().map(|example| example.truth.engine.as_str()).collect();
+    engines.sort_unstable();
+    engines.dedup();
+    let judged = |engine: &str| {
+        let others: Vec<&Example> = examples.iter().filter(|example| example.truth.engine != engine).collect();
+        let decision = learn(&others, serde_json::Value::Null);
+        let own = examples.iter().filter(|example| example.truth.engine == engine);
+        own.map(|example| (example, decision.probabilities(&example.findings))).collect::<Vec<_>>()
+    };
+    engines.into_iter().flat_map(judged).collect()
+}
+
+/// Counts of what is judged.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Judged {
+    /// Logs with an effect of the catalogue that shows, and how many of them it is named in.
+    pub effects: [u32; 2],
+    /// The same by the name alone, whatever the verdict.
+    pub first: u32,
+    /// Logs without one, and how many are called `none`.
+    pub none: [u32; 2],
+    /// Of these how many are called `effect`.
+    pub false_alarms: u32,
+    /// Logs with something outside the catalogue, and how many are called `unknown`.
+    pub outside: [u32; 2],
+    /// Wrong names with a confidence of 0.9 and more, of all logs.
+    pub sure_and_wrong: u32,
+    /// Logs.
+    pub logs: u32,
+    /// Parameters of what was named rightly, and how many 90 % intervals hold the truth.
+    pub intervals: [u32; 2],
+    /// Expected calibration error of the probability that the best effect is right, ten bins.
+    pub calibration_error: f64,
+    /// Of each tenth of that probability: mean, share that was right, number.
+    pub reliability: Vec<(f64, f64, u32)>,
+    /// Mean −ln probability of the right class.
+    pub log_loss: f64,
+    /// Means over the logs.
+    pub rollouts: f64,
+    /// Durations, s.
+    pub seconds: f64,
+}
+
+/// Counts over judged examples.
+#[must_use]
+pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
+    use discrepancy::Verdict;
+    let mut counts = Judged { logs: judged.len() as u32, ..Judged::default() };
+    let mut bins = [(0.0, 0_u32, 0_u32); 10];
+    for (example, found) in judged {
+        let (verdict, label) = (found.verdict(), example.label());
+        let right = example.truth.names(&example.findings.effect);
+        match example.truth.kind() {
+            Kind::Effect => {
+                counts.effects[0] += 1;
+                counts.first += u32::from(right);
+                counts.effects[1] += u32::from(right && verdict == Verdict::Effect);
+            }
+            // A late clock that has its name is no false alarm.
+            Kind::None => {
+                counts.none[0] += 1;
+                let named = verdict == Verdict::Effect;
+                counts.none[1] += u32::from(verdict == Verdict::None || (named && label == 0));
+                counts.false_alarms += u32::from(named && label != 0);
+            }
+            Kind::Outside => {
+                counts.outside[0] += 1;
+                counts.outside[1] += u32::from(verdict == Verdict::Unknown);
+            }
+        }
+        counts.sure_and_wrong += u32::from(found.effect >= 0.9 && label != 0);
+        let bin = &mut bins[((found.effect * 10.0) as usize).min(9)];
+        *bin = (bin.0 + found.effect, bin.1 + u32::from(label == 0), bin.2 + 1);
+        if right {
+            counts.intervals[0] += example.covered.len() as u32;
+            counts.intervals[1] += example.covered.iter().filter(|covered| **covered).count() as u32;
+        }
+        let probability = [found.effect, found.none, found.unknown][label];
+        counts.log_loss -= probability.ln() / judged.len() as f64;
+        counts.rollouts += example.rollouts as f64 / judged.len() as f64;
+        counts.seconds += example.seconds / judged.len() as f64;
+    }
+    for (sum, right, count) in bins.into_iter().filter(|(_, _, count)| *count > 0) {
+        let n = f64::from(count);
+        let (mean, share) = (sum / n, f64::from(right) / n);
+        counts.calibration_error += n / f64::from(counts.logs) * (mean - share).abs();
+        counts.reliability.push((mean, share, count));
+    }
+    counts
+}
