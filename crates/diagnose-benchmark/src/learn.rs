@@ -153,7 +153,8 @@ pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
         if !report.exists() {
             continue;
         }
-        let text = |path: &Path| std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()));
+        let text =
+            |path: &Path| std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()));
         let parse = |path: &Path| format!("{}: expected what this version writes", path.display());
         let truth: Truth = serde_json::from_str(&text(&path)?).with_context(|| parse(&path))?;
         let answer: Answer = serde_json::from_str(&text(&report)?).with_context(|| parse(&report))?;

@@ -96,13 +96,6 @@ pub struct Residuals {
 }
 
 impl Evidence {
-        self.residuals.histogram[1] = self.residuals.histogram[0].clone();
-        self.residuals.autocorrelation[1] = self.residuals.autocorrelation[0].clone();
-        for error in &mut self.errors {
-            (error.after, error.median_after) = (error.before, error.median_before);
-        }
-    }
-
     /// In units of which `units` says how much one of today's is.
     pub(crate) fn in_units(mut self, units: &Units) -> Self {
         let scale = |values: &mut Vec<f64>, factor: f64| {

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::diagnosis::{Diagnosis, Settings};
 use crate::decision::Probabilities;
+use crate::diagnosis::{Diagnosis, Settings};
 use crate::evidence::Evidence;
 use crate::findings::Findings;
 use crate::interval::{bootstrap, middle_90, widen};

@@ -103,12 +103,7 @@ impl Search<'_> {
 
     /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out or another one
     /// promises enough; the model with them, and what was compared.
-    pub(crate) fn effects(
-        &mut self,
-        screening: &Screening,
-        null: &Fit,
-        episodes: &Episodes,
-    ) -> (Fit, Vec<Round>) {
+    pub(crate) fn effects(&mut self, screening: &Screening, null: &Fit, episodes: &Episodes) -> (Fit, Vec<Round>) {
         let settings = self.settings;
         let (mut accepted, mut rounds, mut explained) = (null.clone(), Vec::new(), 0.0);
         let within = |search: &Self| search.study.has_rounds();

@@ -57,7 +57,11 @@ fn run(arguments: &Arguments) -> Result<()> {
     engines.sort_unstable();
     engines.dedup();
     if engines.len() < 2 {
-        bail!("expected answers on logs of two engines or more, found {} logs of {} engines", examples.len(), engines.len());
+        bail!(
+            "expected answers on logs of two engines or more, found {} logs of {} engines",
+            examples.len(),
+            engines.len()
+        );
     }
     let provenance = provenance(arguments, &examples);
     let judged = leave_one_engine_out(&examples);
@@ -98,9 +102,8 @@ fn provenance(arguments: &Arguments, examples: &[Example]) -> serde_json::Value 
         }
     }
     sets.sort();
-    let folders: Vec<String> = (arguments.logs.iter())
-        .filter_map(|folder| Some(folder.file_name()?.to_string_lossy().into_owned()))
-        .collect();
+    let folders: Vec<String> =
+        (arguments.logs.iter()).filter_map(|folder| Some(folder.file_name()?.to_string_lossy().into_owned())).collect();
     let sets: Vec<_> = (sets.iter())
         .map(|(engine, seed, logs)| serde_json::json!({ "engine": engine, "seed": seed, "logs": logs }))
         .collect();

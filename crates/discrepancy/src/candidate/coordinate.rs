@@ -59,8 +59,8 @@ fn coordinate(kind: EffectKind, index: usize, parameter: &Parameter, value: f64,
     // One that is plausible on one side alone is looked for there.
     let (least, most) = (a.min(b), a.max(b));
     let tolerance = 1e-9 * unit;
-    let below = if least < origin - tolerance { -4.0 } else { 0.0 };
-    let above = if most > origin + tolerance { 4.0 } else { 0.0 };
+    let below = if least < origin - tolerance { -FARTHEST } else { 0.0 };
+    let above = if most > origin + tolerance { FARTHEST } else { 0.0 };
     let [from, to] = match scale {
         Scale::Linear => parameter.limits,
         Scale::Reciprocal => [0.0, scale.coordinate(parameter.limits[0])],
@@ -68,6 +68,10 @@ fn coordinate(kind: EffectKind, index: usize, parameter: &Parameter, value: f64,
     let range = [((from - origin) / unit).max(below), ((to - origin) / unit).min(above)];
     Coordinate { index, origin, unit, range, strength: true }
 }
+
+/// How far a strength is looked for, in standard deviations of its prior: eight times as strong as plausible. What is stronger than plausible is named
+/// all the same; the prior says what that costs.
+const FARTHEST: f64 = 12.0;
 
 /// The force, N, and the speed, m/s, up to which the catalogue's ranges are those of a push. Beyond, a sensor may be off by as much more, and a drag be as
 /// much weaker and still make the same force.
