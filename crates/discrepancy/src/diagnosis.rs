@@ -29,6 +29,7 @@ use crate::screen::{Screening, places};
 use crate::search::Search;
 use crate::simulator::Simulator;
 use crate::split::{Compared, HeldOut, LEAST_FITTED, Split, ranking};
+use crate::stamps::period_secs;
 use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
 use crate::touch::{ContactGap, contact_gap};
@@ -243,8 +244,13 @@ fn diagnose_among(
 ) -> Result<Diagnosis, Error> {
     let log = &*driven(log, name, nominal)?;
     let units = Units::of(log);
-    let (log, tunables) = (&*units.inverse().log(log), nominal.tunables.clone());
-    let nominal = &nominal.in_units(&units.inverse())?;
+    let (mut log, tunables) = (units.inverse().log(log), nominal.tunables.clone());
+    let period_secs = period_secs(&log);
+    if period_secs != log.header.period_secs {
+        log.to_mut().header.period_secs = period_secs;
+    }
+    let log = &*log;
+    let nominal = &nominal.in_units(&units.inverse())?.with_period_secs(period_secs);
     let noise = NoiseLevels::of_log(log);
     plausible::check(log, name, nominal, (&noise, &units), LEAST_FITTED)?;
     let Compared { trials, fitted, choosing, reported, left_out } =

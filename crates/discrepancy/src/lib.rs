@@ -69,6 +69,7 @@ mod search;
 pub mod separate;
 pub mod simulator;
 pub mod split;
+mod stamps;
 pub mod study;
 pub mod terms;
 pub mod touch;

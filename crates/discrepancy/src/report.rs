@@ -168,14 +168,14 @@ impl Report {
         format!("Noise: {}.", sentences.join("; "))
     }
 
-    /// Which clocks differ from the tool's by more than their intervals.
+    /// Which clocks differ from the tool's by more than their intervals, and than clocks do.
     #[must_use]
     pub fn clock_sentences(&self) -> Vec<String> {
         let clock = |value: &Retuned| {
             let whose = value.key.strip_prefix("clock.")?.strip_suffix("_secs")?;
             let [low, high] = value.interval90;
             let late = if value.value > 0.0 { "late" } else { "early" };
-            (low * high > 0.0).then(|| {
+            (low * high > 0.0 && value.value.abs() > value.prior[1]).then(|| {
                 let [ms, low, high] = [value.value, low, high].map(|secs| 1e3 * secs);
                 format!("The clock of the {whose} is {:.1} ms {late} against the tool's (90 %: {low:.1} to {high:.1} ms); re-tuned, no effect.", ms.abs())
             })

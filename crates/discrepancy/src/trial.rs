@@ -199,7 +199,7 @@ impl Trial {
         if ticks == 0 {
             return None;
         }
-        let commands = start::commands(episode, begin_secs, period_secs, ticks);
+        let commands = start::commands(episode, noise, begin_secs, period_secs, ticks);
         if has_tool && commands.is_none() {
             return None;
         }

@@ -114,7 +114,7 @@ fn promising(seen: &Seen, place: Place) -> Vec<Place> {
 /// Places in the study of the episodes that come near a body: those that the model leaves most of, and others.
 fn near(study: &Study, null: &Fit, seen: &Seen, body: Place) -> [Vec<usize>; 2] {
     let white = study.white(&study.raw(&null.model.hypothesis(&null.x)), &[]);
-    let apart_m = study.chosen.iter().map(|trial| seen.apart_m(*trial, body));
+    let apart_m = (0..study.chosen.len()).map(|place| seen.apart_m(place, body));
     let left: Vec<f64> = white.iter().map(|residuals| mean_square(std::slice::from_ref(residuals))).collect();
     choose(&left, &apart_m.collect::<Vec<_>>())
 }

@@ -42,6 +42,11 @@ fn evidence() -> Evidence {
     }
 }
 
+fn noise() -> SensorNoise {
+    let (channel, source) = (Kind::ObjectPosition, Source::Estimated);
+    SensorNoise { channel, unit: "m", stddev: 5e-4, source, scatter: Some(5e-4) }
+}
+
 fn report(verdict: Verdict) -> Report {
     let tilt = NamedEffect {
         name: "table_tilt",
@@ -109,13 +114,7 @@ fn report(verdict: Verdict) -> Report {
         }],
         evidence: evidence(),
         next_experiment: "Push in eight directions.".into(),
-        noise: vec![SensorNoise {
-            channel: Kind::ObjectPosition,
-            unit: "m",
-            stddev: 5e-4,
-            source: Source::Estimated,
-            scatter: Some(5e-4),
-        }],
+        noise: vec![noise()],
         split: Split { fitted: 28, choosing: 6, reported: 6, shared: false },
         seed: 1,
         fold: None,
