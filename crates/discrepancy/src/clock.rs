@@ -1,20 +1,15 @@
 //! Clocks of object and force against that of the tool.
 //!
-//! Recorders stamp what they get, and camera, arm and force sensor come by different ways. A skew of some milliseconds is no effect: it is re-tuned like a
-//! mass, before anything is named. What is late by clearly more has a name in the catalogue (`pose_delay`, `force_delay`), so a skew
-//! reaches to that side as far as its prior alone does, and gives way where such an effect is tried. What is early is the tool's
-//! column being late: no effect says that, and the skew reaches as far as recorders err.
+//! Recorders stamp what they get, and camera, arm and force sensor come by different ways. A skew is the commonest defect of a rig and no effect: it is
+//! re-tuned like a mass, before anything is named, and reported. Poses may be early or late by 50 ms; what is later is `pose_delay`. Forces come by
+//! the same wire as the tool's column as a rule, and are late where a sensor filters or queues them: they may be early by 50 ms, which is
+//! the tool's column being late, and late by 5 ms; what is later is `force_delay`. A skew gives way where such an effect is tried.
 
 use physics_model::EffectKind;
 use physics_model::effect::signal::Blend as _;
 use physics_model::rig::RigReading;
 
 use crate::model::STEP;
-
-/// Standard deviation of a skew, s: a frame of a fast camera.
-pub(crate) const STDDEV_SECS: f64 = 0.005;
-/// How far it reaches in standard deviations: 50 ms to the early side.
-pub(crate) const RANGE: [f64; 2] = [-10.0, 1.0];
 
 /// A clock that differs from the tool's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +31,27 @@ impl Clock {
         }
     }
 
+    /// Standard deviation of its skew, s: a frame of a fast camera, or of a slow one.
+    pub(crate) fn stddev_secs(self) -> f64 {
+        match self {
+            Self::Object => 0.01,
+            Self::Force => 0.005,
+        }
+    }
+
+    /// How far its skew reaches, in standard deviations.
+    pub(crate) fn range(self) -> [f64; 2] {
+        match self {
+            Self::Object => [-5.0, 5.0],
+            Self::Force => [-10.0, 1.0],
+        }
+    }
+
+    /// Step of a finite difference at `z`, away from the border.
+    pub(crate) fn step(self, z: f64) -> f64 {
+        if z + STEP <= self.range()[1] { STEP } else { -STEP }
+    }
+
     /// Whether an effect says the same and more.
     pub(crate) fn gives_way_to(self, kind: EffectKind) -> bool {
         match self {
@@ -43,11 +59,6 @@ impl Clock {
             Self::Force => kind == EffectKind::ForceDelay,
         }
     }
-}
-
-/// Step of a finite difference at `z`, away from the border.
-pub(crate) fn step(z: f64) -> f64 {
-    if z + STEP <= RANGE[1] { STEP } else { -STEP }
 }
 
 /// Readings as clocks that are late by `skews_secs`, in the order of [`Clock::ALL`], stamp them. Before the start what is there then holds, after the end what was read last.

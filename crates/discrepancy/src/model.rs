@@ -2,7 +2,7 @@
 //! the effects that it is given. All have prior N(0, 1).
 
 use crate::candidate::Candidate;
-use crate::clock;
+use crate::clock::Clock;
 use crate::simulator::Hypothesis;
 
 /// Re-tuning reaches this many prior standard deviations.
@@ -62,7 +62,7 @@ impl Model {
     #[must_use]
     pub fn range(&self, index: usize) -> [f64; 2] {
         match index.checked_sub(self.tunables) {
-            None if index < self.clocks => clock::RANGE,
+            None if index < self.clocks => Clock::ALL[index].range(),
             None => [-TUNABLE_RANGE, TUNABLE_RANGE],
             Some(index) if index < self.errors => [-ERROR_RANGE, ERROR_RANGE],
             Some(index) => {
@@ -82,7 +82,7 @@ impl Model {
     #[must_use]
     pub fn step(&self, x: &[f64], index: usize) -> f64 {
         if index < self.clocks {
-            return clock::step(x[index]);
+            return Clock::ALL[index].step(x[index]);
         }
         if x[index] + STEP <= self.range(index)[1] { STEP } else { -STEP }
     }

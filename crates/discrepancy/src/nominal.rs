@@ -10,7 +10,7 @@ use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::rig::{Prism, Rig, RigObject, RigShape, RigTool};
 use physics_model::{EffectConfig, EffectKind, ObjectShape};
 
-use crate::clock::{self, Clock};
+use crate::clock::Clock;
 use crate::error::Error;
 use crate::units::Units;
 
@@ -187,7 +187,7 @@ impl Nominal {
         let clock = |clock: Clock| Tunable {
             key: clock.key().into(),
             mean: 0.0,
-            stddev: clock::STDDEV_SECS,
+            stddev: clock.stddev_secs(),
             positive: false,
             place: Place::Clock(clock),
         };

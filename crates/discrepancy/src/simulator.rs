@@ -11,7 +11,7 @@ use physics_model::{BodyState, EffectConfig, EffectKind};
 use rayon::prelude::*;
 
 use crate::cells::{Key, key};
-use crate::clock::{skewed, step};
+use crate::clock::{Clock, skewed};
 use crate::nominal::{Engine, Nominal};
 use crate::progress::Progress;
 use crate::trial::{Block, Trial, WHOLE};
@@ -198,7 +198,7 @@ impl<'a> Simulator<'a> {
             ahead.clear();
             ahead.extend((0..clocks).map(|clock| {
                 let mut hypothesis = hypothesis.clone();
-                hypothesis.z[clock] += step(hypothesis.z[clock]);
+                hypothesis.z[clock] += Clock::ALL[clock].step(hypothesis.z[clock]);
                 Ahead { residuals: residuals(&hypothesis, readings.clone()), hypothesis }
             }));
         }

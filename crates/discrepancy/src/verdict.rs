@@ -61,3 +61,88 @@ pub(crate) fn decide(decision: &Decision, accepted: Fit, rounds: &[Round], findi
     });
     Decided { verdict, probabilities, confidences, model, reason }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::{candidates, tests::context};
+    use crate::likelihood::Stack;
+    use crate::model::Model;
+    use crate::rival::{Heldout, Rival};
+
+    fn fit(effects: usize) -> Fit {
+        let all = candidates(&context());
+        let model = all.iter().take(effects).fold(Model::nominal(0, 0), |model, candidate| model.with(candidate));
+        Fit::new(model, Vec::new(), Vec::new(), Stack::default(), Vec::new())
+    }
+
+    /// A round that adds an effect to `base` others.
+    fn round(base: usize) -> Round {
+        let rival = Rival { fit: fit(base + 1), whole: true, gain: 1.0, heldout: Heldout::default() };
+        let (before, passed_over, promises) = (Heldout::default(), Vec::new(), Vec::new());
+        Round { promises, rivals: vec![rival], passed_over, base: fit(base), before, hasty: false }
+    }
+
+    /// Findings with this ln evidence, of which the decision below reads the probability of an effect.
+    fn findings(log_evidence: f64) -> Findings {
+        Findings {
+            effect: "table_tilt".into(),
+            log_evidence,
+            margin: 0.0,
+            steadiness: 0.0,
+            heldout_steadiness: 0.0,
+            drop: 0.0,
+            before: 1.0,
+            after: 1.0,
+            motion_after: 1.0,
+            force_after: 1.0,
+            motion_share: [0.0; 2],
+            force_share: [0.0; 2],
+            size: 1.0,
+            episodes: [20, 4],
+        }
+    }
+
+    /// Odds of an effect against `other` that are one plus the ln evidence.
+    fn decision(other: [f64; 2]) -> Decision {
+        let names = crate::decision::FEATURES;
+        let weights = |first: f64| [vec![first], vec![0.0; names.len() - 1]].concat();
+        let [none, unknown] = other.map(|offset| (offset, weights(0.0)));
+        Decision {
+            provenance: serde_json::Value::Null,
+            features: names.iter().map(|name| ((*name).to_string(), 0.0, 1.0)).collect(),
+            classes: [(0.0, weights(1.0)), none, unknown],
+        }
+    }
+
+    #[test]
+    fn what_is_more_probable_than_not_is_named_whatever_the_search_accepted() {
+        let none = decision([0.0, -50.0]);
+        let named = decide(&none, fit(0), &[round(0)], &[findings(8.0)]);
+        assert_eq!((named.verdict, named.model.model.parts.len()), (Verdict::Effect, 1));
+        assert!((named.confidences[0] - 0.9).abs() < 1e-9);
+        // What the search accepted is taken back where nothing is missing.
+        let kept = decide(&none, fit(1), &[round(0)], &[findings(0.0)]);
+        assert_eq!((kept.verdict, kept.model.model.parts.len(), kept.reason), (Verdict::None, 0, None));
+    }
+
+    #[test]
+    fn an_unknown_gap_shows_an_effect_that_is_worth_telling() {
+        let unknown = decision([-50.0, 1.0]);
+        let near = decide(&unknown, fit(1), &[round(0)], &[findings(0.0)]);
+        assert_eq!((near.verdict, near.model.model.parts.len()), (Verdict::Unknown, 1));
+        assert!(near.confidences[0] < 0.5 && near.reason.is_some());
+        let far = decide(&decision([-50.0, 3.0]), fit(1), &[round(0)], &[findings(0.0)]);
+        assert_eq!((far.verdict, far.model.model.parts.len()), (Verdict::Unknown, 0));
+    }
+
+    #[test]
+    fn a_further_effect_is_named_if_it_is_more_probable_right_than_not() {
+        let none = decision([0.0, -50.0]);
+        let rounds = [round(0), round(1)];
+        let both = decide(&none, fit(2), &rounds, &[findings(8.0), findings(4.0)]);
+        assert_eq!(both.confidences.len(), 2);
+        let one = decide(&none, fit(2), &rounds, &[findings(8.0), findings(0.0)]);
+        assert_eq!((one.verdict, one.model.model.parts.len()), (Verdict::Effect, 1));
+    }
+}

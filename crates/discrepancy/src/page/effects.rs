@@ -133,7 +133,7 @@ fn bars(ranking: &[RankedEffect], words: &Words) -> Markup {
         div class="row rank axis" { span {} div { (strip_labels(&axis, 4)) } span {} }
         p.soft {
             "Gain in " (words.mark("ln evidence")) " over the re-tuned nominal model; behind: how much less than the best (" (near) " is " (odds)
-            " to 1, see confidence); held-out: mean square with it. A name needs both: the gain, and held-out episodes that agree."
+            " to 1, see confusion set); held-out: mean square with it."
         }
     }
 }
