@@ -17,8 +17,8 @@ use crate::logistic;
 const VARIANCE: f64 = 1.0;
 /// A mean square difference, in those of noise, by which an effect changes its episodes, below which nothing shows.
 const DETECTABLE: f64 = 3.0;
-/// A clock that is late by more than this has the name of a delay, s.
-const LATE_SECS: f64 = 0.005;
+/// What is re-tuned like a mass is no effect that a diagnosis names.
+const RE_TUNED: &str = "contact_compliance";
 
 /// What a log hides.
 #[derive(Clone, Debug, Deserialize)]
@@ -37,9 +37,6 @@ pub struct Truth {
     pub detectable: Option<f64>,
     /// Whether its actions were chosen to tell effects apart.
     pub designed: bool,
-    /// By how much the object's clock is late, s.
-    #[serde(default)]
-    pub skew_s: f64,
 }
 
 /// A hidden effect.
@@ -65,22 +62,22 @@ pub enum Kind {
 }
 
 impl Truth {
-    /// What a right answer is. An effect that changes less than noise is none.
+    /// What a right answer is. An effect that changes less than noise is none, and so is what is re-tuned.
     #[must_use]
     pub fn kind(&self) -> Kind {
         let shows = self.detectable.is_some_and(|size| size >= DETECTABLE);
-        match (self.effects.is_empty(), self.outside.is_empty()) {
+        let named = |effect: &Named| effect.name != RE_TUNED;
+        match (!self.effects.iter().any(named), self.outside.is_empty()) {
             (_, false) if shows => Kind::Outside,
             (false, true) if shows => Kind::Effect,
             _ => Kind::None,
         }
     }
 
-    /// Whether a name is right: one of what is hidden, or a delay of a clock that is late.
+    /// Whether a name is one of what is hidden.
     #[must_use]
     pub fn names(&self, name: &str) -> bool {
-        let late = name == "pose_delay" && self.skew_s > LATE_SECS;
-        late || self.effects.iter().any(|effect| effect.name == name)
+        self.effects.iter().any(|effect| effect.name == name)
     }
 }
 
@@ -127,7 +124,6 @@ impl Example {
     fn label(&self) -> usize {
         match self.truth.kind() {
             Kind::Effect if self.truth.names(&self.findings.effect) => 0,
-            Kind::None if self.truth.names(&self.findings.effect) && self.truth.skew_s > LATE_SECS => 0,
             Kind::None => 1,
             Kind::Effect | Kind::Outside => 2,
         }
@@ -258,12 +254,10 @@ pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
                 counts.first += u32::from(right);
                 counts.effects[1] += u32::from(right && verdict == Verdict::Effect);
             }
-            // A late clock that has its name is no false alarm.
             Kind::None => {
                 counts.none[0] += 1;
-                let named = verdict == Verdict::Effect;
-                counts.none[1] += u32::from(verdict == Verdict::None || (named && label == 0));
-                counts.false_alarms += u32::from(named && label != 0);
+                counts.none[1] += u32::from(verdict == Verdict::None);
+                counts.false_alarms += u32::from(verdict == Verdict::Effect);
             }
             Kind::Outside => {
                 counts.outside[0] += 1;
@@ -289,4 +283,75 @@ pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
         counts.reliability.push((mean, share, count));
     }
     counts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example(engine: &str, effect: bool, found: &str, log_evidence: f64) -> Example {
+        let effects =
+            if effect { vec![Named { name: "table_tilt".into(), parameters: BTreeMap::new() }] } else { Vec::new() };
+        let truth = Truth {
+            engine: engine.into(),
+            variant: "default".into(),
+            seed: 1,
+            effects,
+            outside: Vec::new(),
+            detectable: Some(if effect { 10.0 } else { 0.0 }),
+            designed: true,
+        };
+        let findings = Findings {
+            effect: found.into(),
+            log_evidence,
+            margin: log_evidence,
+            steadiness: 1.0,
+            heldout_steadiness: 1.0,
+            drop: 0.0,
+            before: 2.0,
+            after: 2.0,
+            motion_after: 2.0,
+            force_after: 1.0,
+            motion_share: [0.1; 2],
+            force_share: [0.0; 2],
+            size: 1.0,
+            episodes: [20, 4],
+        };
+        Example { log: "log".into(), truth, findings, covered: vec![true], rollouts: 100, seconds: 1.0 }
+    }
+
+    #[test]
+    fn what_tells_effects_from_nothing_on_some_engines_is_used_on_another() {
+        let mut examples = Vec::new();
+        for engine in ["a", "b", "c"] {
+            for size in 0..10 {
+                examples.push(example(engine, true, "table_tilt", 200.0 + f64::from(size)));
+                examples.push(example(engine, false, "tether", 2.0 + f64::from(size)));
+            }
+        }
+        let judged = judge(&leave_one_engine_out(&examples));
+        assert_eq!((judged.effects, judged.none, judged.false_alarms), ([30, 30], [30, 30], 0));
+        assert!(judged.calibration_error < 0.2 && judged.sure_and_wrong == 0, "{judged:?}");
+        // On an engine where evidence says nothing the answers are wrong, and the table says so.
+        examples.extend((0..10).map(|_| example("d", false, "tether", 300.0)));
+        let judged = leave_one_engine_out(&examples);
+        let own: Vec<_> = judged.into_iter().filter(|(example, _)| example.truth.engine == "d").collect();
+        assert_eq!(judge(&own).false_alarms, 10);
+    }
+
+    #[test]
+    fn an_effect_that_does_not_show_or_is_re_tuned_is_none() {
+        let mut hidden = example("a", true, "table_tilt", 10.0).truth;
+        assert_eq!(hidden.kind(), Kind::Effect);
+        hidden.detectable = Some(0.5);
+        assert_eq!(hidden.kind(), Kind::None);
+        hidden = Truth {
+            detectable: Some(50.0),
+            effects: vec![Named { name: RE_TUNED.into(), parameters: BTreeMap::new() }],
+            ..hidden
+        };
+        assert_eq!(hidden.kind(), Kind::None);
+        hidden.outside.push(serde_json::Value::from("magnet"));
+        assert_eq!(hidden.kind(), Kind::Outside);
+    }
 }
