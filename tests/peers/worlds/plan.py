@@ -51,6 +51,15 @@ class Episode:
     seconds: float = 1.0
     added_kg: float = 0.0
     rests: bool = True  # on the table when it begins
+    tick_s: float = 0.0  # of the controller, which goes straight from tick to tick; 0: smooth
+
+    def places(self, times):
+        """Of the tool's course, `[time, 3]`."""
+        if not self.tick_s:
+            return self.course.places(times)
+        ticks = np.arange(math.ceil(self.course.end_s / self.tick_s) + 2) * self.tick_s
+        nodes = self.course.places(ticks)
+        return np.stack([np.interp(times, ticks, nodes[:, a]) for a in range(3)], axis=1)
 
 
 def gap(scene, yaw, rel):
@@ -99,9 +108,9 @@ def stroke(scene, rng, kind, direction=None, aside=None, speed=None, added_kg=0.
     aside = rng.uniform(-0.5, 0.5) if aside is None else aside
     touch, u = behind(scene, place, yaw, direction, aside)
     speed = fast * log_uniform(rng, 0.05, 0.3) if speed is None else speed
-    before = length * rng.uniform(0.08, 0.3)
+    before = length * rng.uniform(0.05, 0.15)
     course = Course(touch - before * u).wait(rng.uniform(0.08, 0.2))
-    way = min(length * rng.uniform(0.6, 1.8), 2.0 * speed + 0.3 * length)
+    way = min(length * rng.uniform(0.5, 1.6), 1.2 * speed + 0.15 * length)
     if kind == "hit":
         # The tool stops soon after it has touched: the object goes on by itself.
         speed = fast * rng.uniform(0.2, 0.6)
@@ -120,9 +129,9 @@ def stroke(scene, rng, kind, direction=None, aside=None, speed=None, added_kg=0.
     else:
         course.move((before + way) * u, speed, 0.08, 0.04)
     if long_rest:
-        course.wait(rng.uniform(6.0, 12.0)).move(0.3 * length * u, speed)
+        course.wait(rng.uniform(4.0, 8.0)).move(0.3 * length * u, speed)
     course.wait(rng.uniform(0.05, 0.2)).move(-rng.uniform(0.1, 0.3) * length * u, 0.2 * fast)
-    course.wait(0.5 if kind == "hit" else rng.uniform(0.15, 0.4))
+    course.wait(0.4 if kind == "hit" else rng.uniform(0.1, 0.25))
     pose = [*place, scene.half_height_m, *scene.orientation(yaw)]
     return Episode(pose, [0.0] * 6, course, course.end_s, added_kg)
 
@@ -166,16 +175,27 @@ def in_the_air(scene, rng):
     return Episode(pose, [0.0] * 6, course, course.end_s)
 
 
-def draw_plan(rng, scene, rig, added_kg=None):
+def draw_plan(rng, scene, rig):
     """The episodes of a log."""
     if rig.tosses:
         return [toss(scene, rng) for _ in range(rig.episodes)]
-    long = rig.episodes // 3 if rig.long_rests else 0
-    if not rig.designed:
-        kinds = rng.choice(["straight", "hit", "turn", "steps", "creep"], size=rig.episodes, p=[0.45, 0.2, 0.15, 0.1, 0.1])
-        return [stroke(scene, rng, str(kind), long_rest=i < long) for i, kind in enumerate(kinds)]
+    out = draw_designed(rng, scene, rig) if rig.designed else draw_passive(rng, scene, rig)
+    for episode in out:
+        episode.tick_s = rig.period_s if rig.straight else 0.0
+    return out
+
+
+def draw_passive(rng, scene, rig):
+    kinds = rng.choice(["straight", "hit", "turn", "steps", "creep"], size=rig.episodes, p=[0.45, 0.2, 0.15, 0.1, 0.1])
+    long = rig.episodes // 4 if rig.long_rests else 0
+    return [stroke(scene, rng, str(kind), long_rest=i < long) for i, kind in enumerate(kinds)]
+
+
+def draw_designed(rng, scene, rig):
+    """Eight directions, four speeds, a known weight in every fourth; some strokes that let go, some moves in the air."""
+    long = rig.episodes // 4 if rig.long_rests else 0
     speeds = [scene.speed_mps * v for v in (0.04, 0.1, 0.2, 0.35)]
-    added = round(scene.mass_kg * rng.uniform(0.4, 1.0), 4) if added_kg is None else added_kg
+    added = round(scene.mass_kg * rng.uniform(0.4, 1.0), 4)
     out, turns = [], rng.permutation(8)
     for i in range(rig.episodes):
         if i % 8 == 7:
@@ -185,5 +205,6 @@ def draw_plan(rng, scene, rig, added_kg=None):
         aside = (0.0, 0.35, 0.0, -0.35)[i % 4]
         weight = added if (i + i // 4) % 4 == 1 else 0.0
         kind = "creep" if i % 12 == 5 else "straight"
-        out.append(stroke(scene, rng, kind, direction, aside, speeds[(i + i // 4) % 4], weight, long_rest=i % 3 == 0 and i // 3 < long))
+        rest = i % 3 == 0 and i // 3 < long
+        out.append(stroke(scene, rng, kind, direction, aside, speeds[(i + i // 4) % 4], weight, rest))
     return out

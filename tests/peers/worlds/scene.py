@@ -92,6 +92,7 @@ class Rig:
     tosses: bool  # no tool
     sensors: set = field(default_factory=set)  # command, tool, force, torque, orientation, velocity
     period_s: float = 0.01
+    straight: bool = True  # the tool goes straight from tick to tick of its controller; else smoothly
     jitter: float = 0.0  # standard deviation, periods
     dropped: float = 0.0  # share of rows
     lost_poses: float = 0.0  # share of rows without the object
@@ -205,6 +206,7 @@ def draw_rig(rng, scene):
     rig = Rig(designed=bool(rng.random() < 0.5), tosses=tosses, sensors=draw_sensors(rng, tosses))
     rate = log_uniform(rng, *([(30, 120)] * 8 + [(15, 30), (120, 500)])[rng.integers(10)])
     rig.period_s = round(1.0 / rate, 4)
+    rig.straight = bool(rate < 40.0 or rng.random() < 0.6)
     if rng.random() < 0.5:
         rig.jitter = float(rng.uniform(0.01, 0.15))
     if rng.random() < 0.4:
@@ -222,6 +224,6 @@ def draw_rig(rng, scene):
     keys = list(rig.noise)
     rig.noise_stated = set(keys) if said < 0.6 else set() if said < 0.8 else {k for k in keys if rng.random() < 0.5}
     few = rng.random()
-    rig.episodes = int(rng.integers(5, 16) if few < 0.12 else rng.integers(41, 61) if few > 0.93 else rng.integers(16, 41))
+    rig.episodes = int(rng.integers(5, 16) if few < 0.12 else rng.integers(41, 61) if few > 0.93 else rng.triangular(16, 18, 41))
     rig.long_rests = bool(rng.random() < 0.2)
     return rig

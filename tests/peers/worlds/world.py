@@ -278,8 +278,8 @@ class World:
         if episode.course is None:
             tool = command = np.repeat(far[None], len(times), axis=0)
         else:
-            command = episode.course.places(times * rate)
-            tool = episode.course.places(self.tool_times(times))
+            command = episode.places(times * rate)
+            tool = episode.places(self.tool_times(times))
             if "actuator_gain" in self.effects:
                 tool = tool[0] + self.effects["actuator_gain"]["gain"] * (tool - tool[0])
         if self.effects.get("mass_leak"):
@@ -298,7 +298,8 @@ class World:
         poses[0], velocities[0], went = pose, velocity, tool.copy()
         force = torque = None
         pressed, kept = 0.0, math.exp(-h / JAM_S)
-        reach = 15.0 * self.scene.length_m
+        reach, most = 15.0 * self.scene.length_m, JAM_WEIGHTS * body.mass_kg * GRAVITY
+        x, y = episode.pose[:2]
         for k in range(1, n):
             if not idle:
                 force, torque = hidden(k - 1, times[k - 1], pose, velocity, went[k - 1])
@@ -310,7 +311,7 @@ class World:
             pose, velocity = engine.state()
             poses[k], velocities[k], wrenches[k] = pose, velocity, wrench
             pressed = kept * pressed + (1 - kept) * math.sqrt(wrench[:3] @ wrench[:3])
-            if not pressed < JAM_WEIGHTS * body.mass_kg * GRAVITY or not abs(pose[:3] - episode.pose[:3]).max() < reach or pose[2] < 0.0:
+            if not (pressed < most and math.hypot(pose[0] - x, pose[1] - y) < reach and pose[2] > 0.0):
                 n = k
                 break
         return Trace(times[:n], command[:n], went[:n], poses[:n], velocities[:n], wrenches[:n])

@@ -22,7 +22,7 @@ import numpy as np
 
 TOOL_RATIO = 1e4
 ENGINES = {"mujoco": ("default", "soft", "hard", "pyramidal"), "bullet": ("default", "fine", "unscaled"),
-           "drake": ("point", "hydroelastic", "tamsi"), "dart": ("default", "bullet", "coarse", "pyramidal")}
+           "drake": ("point", "hydroelastic", "tamsi"), "dart": ("default", "bullet", "fine", "pyramidal")}
 # What a variant has of itself, against ideal friction on the corners (check_engines.py): no wrong name for it.
 NATURAL = {("drake", "hydroelastic"): ("pressure_distribution",), ("mujoco", "soft"): ("contact_compliance", "pressure_distribution"),
            ("mujoco", "pyramidal"): ("anisotropic_friction", "pressure_distribution"), ("dart", "pyramidal"): ("anisotropic_friction",)}

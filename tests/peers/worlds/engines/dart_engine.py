@@ -1,14 +1,16 @@
 """DART: hard contacts, friction in an exact cone; found by ODE's detector (`bullet`: by Bullet's). `pyramidal` has its default solver, a linear
 complementarity problem whose friction is more by up to √2 between the axes."""
 
+import math
+
 import dartpy as dart
 import numpy as np
 
 from engines import TOOL_RATIO
 
 VERSION = getattr(dart, "__version__", "6.20.0")
-VARIANTS = {"default": (0.001, dart.collision.OdeCollisionDetector), "pyramidal": (0.001, dart.collision.OdeCollisionDetector),
-            "bullet": (0.001, dart.collision.BulletCollisionDetector), "coarse": (0.002, dart.collision.OdeCollisionDetector)}
+VARIANTS = {"default": (0.002, dart.collision.OdeCollisionDetector), "bullet": (0.002, dart.collision.BulletCollisionDetector),
+            "fine": (0.001, dart.collision.OdeCollisionDetector), "pyramidal": (0.002, dart.collision.OdeCollisionDetector)}
 # Of a pair counts the smaller coefficient.
 ROUGH = 10.0
 
@@ -29,17 +31,17 @@ def matrix(q):
 
 def quaternion(r):
     """x, y, z, w of a rotation matrix (Shepperd 1978)."""
-    trace = r[0, 0] + r[1, 1] + r[2, 2]
-    i = int(np.argmax([r[0, 0], r[1, 1], r[2, 2], trace]))
-    if i == 3:
-        q = [r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1], 1 + trace]
+    (a, b, c), (d, e, f), (g, h, i) = r.tolist()
+    trace = a + e + i
+    if trace > 0.0:
+        q = (h - f, c - g, d - b, 1 + trace)
+    elif a >= e and a >= i:
+        q = (1 + a - e - i, b + d, c + g, h - f)
+    elif e >= i:
+        q = (b + d, 1 - a + e - i, f + h, c - g)
     else:
-        j, k = (i + 1) % 3, (i + 2) % 3
-        q = [0.0] * 4
-        q[i], q[j], q[k] = 1 + 2 * r[i, i] - trace, r[j, i] + r[i, j], r[k, i] + r[i, k]
-        q[3] = r[k, j] - r[j, k]
-    q = np.array(q)
-    return q / np.sqrt(q @ q)
+        q = (c + g, f + h, 1 - a - e + i, d - b)
+    return np.array(q) / math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
 
 
 class Engine:

@@ -1,5 +1,5 @@
-"""MuJoCo: soft contacts by convex optimisation. `default` has its defaults but for an elliptic cone and a step of 1 ms, `pyramidal`
-also their cone, whose friction is less by up to 1 / √2 between the axes. Contacts are quicker for objects thinner than 10 cm, which would sink in
+"""MuJoCo: soft contacts by convex optimisation. `default` has its defaults but for an elliptic cone, `pyramidal` also their
+cone, whose friction is less by up to 1 / √2 between the axes. Contacts are quicker for objects thinner than 10 cm, which would sink in
 when they land."""
 
 import math
@@ -12,10 +12,10 @@ from engines import TOOL_RATIO
 VERSION = mujoco.__version__
 # Time constant of a contact (of objects of 10 cm and more), solimp, cone, impratio, step.
 VARIANTS = {
-    "default": (0.02, "0.9 0.95 0.001 0.5 2", "elliptic", 1, 0.001),
-    "soft": (0.05, "0.8 0.9 0.002 0.5 2", "elliptic", 1, 0.001),
-    "hard": (0.008, "0.97 0.99 0.0005 0.5 2", "elliptic", 10, 0.0005),
-    "pyramidal": (0.02, "0.9 0.95 0.001 0.5 2", "pyramidal", 1, 0.001),
+    "default": (0.02, "0.9 0.95 0.001 0.5 2", "elliptic", 1, 0.002),
+    "soft": (0.05, "0.8 0.9 0.002 0.5 2", "elliptic", 1, 0.002),
+    "hard": (0.01, "0.97 0.99 0.0005 0.5 2", "elliptic", 10, 0.001),
+    "pyramidal": (0.02, "0.9 0.95 0.001 0.5 2", "pyramidal", 1, 0.002),
 }
 
 
@@ -42,6 +42,10 @@ class Engine:
             solref, solimp, self.step_s = f"{-rate ** 2} {-2 * damping * rate}", "0.001 0.001 0.001 0.5 2", 0.0005
         self.m = mujoco.MjModel.from_xml_string(self.xml(solref, solimp, cone, impratio))
         self.d = mujoco.MjData(self.m)
+        # Views of the state: the properties are slow.
+        self.q, self.v, self.load = self.d.qpos, self.d.qvel, self.d.xfrc_applied[1]
+        self.tool_q, self.tool_v, self.turn = self.d.qpos[7:14], self.d.qvel[6:12], self.d.xmat[1]
+        self.still = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
         self.pairs = [i for i in range(self.m.npair) if self.m.pair(i).name.startswith("table")]
         self.tool_kg = TOOL_RATIO * body.mass_kg
         self.tool_kgm2 = self.tool_kg * body.tool_radius_m ** 2
@@ -90,24 +94,24 @@ class Engine:
         mujoco.mj_forward(self.m, self.d)
 
     def step(self, force, torque, tool_m):
-        d = self.d
+        speed = self.tool_v
         v = (tool_m - self.tool_m) / self.step_s
-        d.qpos[7:14] = [*self.tool_m, 1.0, 0.0, 0.0, 0.0]
-        d.qvel[6:9], d.qvel[9:12] = v, 0.0
+        self.still[:3] = self.tool_m
+        self.tool_q[:] = self.still
+        speed[:3], speed[3:] = v, 0.0
         if force is not None:
-            d.xfrc_applied[1, :3], d.xfrc_applied[1, 3:] = force, torque
-        mujoco.mj_step(self.m, d)
+            self.load[:3], self.load[3:] = force, torque
+        mujoco.mj_step(self.m, self.d)
         self.tool_m = tool_m
-        wrench = np.empty(6)
-        wrench[:3] = (d.qvel[6:9] - v) * (self.tool_kg / self.step_s)
-        wrench[3:] = d.qvel[9:12] * (self.tool_kgm2 / self.step_s)
+        wrench = speed * (self.tool_kgm2 / self.step_s)
+        wrench[:3] = (speed[:3] - v) * (self.tool_kg / self.step_s)
         return wrench
 
     def state(self):
-        p, v = self.d.qpos, self.d.qvel
-        # xmat is that of the step's begin: good to a step's turn.
-        return (np.array([p[0], p[1], p[2], p[4], p[5], p[6], p[3]]),
-                np.concatenate([v[:3], self.d.xmat[1].reshape(3, 3) @ v[3:6]]))
+        # The matrix is that of the step's begin: good to a step's turn.
+        v = self.v[:6].copy()
+        v[3:] = self.turn.reshape(3, 3) @ v[3:]
+        return self.q[[0, 1, 2, 4, 5, 6, 3]], v
 
     def set_friction(self, mu):
         self.m.pair_friction[self.pairs, :2] = mu
