@@ -170,9 +170,11 @@ def truth_of(seed, index, engine, variant, scene, rig, kind, effects, plan, seen
               | ({"detectable": float(f"{each[n]:.4g}")} if n in each else {}) for n, p in effects.items()]
     return {
         "name": f"log-{index:03d}", "seed": seed, "engine": engine, "variant": variant, "engine_version": engines.version(engine),
-        "natural": list(engines.NATURAL.get((engine, variant), ())), "kind": kind, "effects": listed if catalogue else [], "outside": listed if kind == "outside" else [],
+        "natural": list(engines.NATURAL.get((engine, variant), ())), "kind": kind,
+        "effects": listed if catalogue else [], "outside": listed if kind == "outside" else [],
         "detectable": float(f"{seen:.4g}"), "designed": rig.designed and not rig.tosses, "tosses": rig.tosses,
-        "sensors": sorted(rig.sensors), "period_s": rig.period_s, "straight": rig.straight, "jitter": round(rig.jitter, 4), "dropped": round(rig.dropped, 4),
+        "sensors": sorted(rig.sensors), "period_s": rig.period_s, "straight": rig.straight,
+        "jitter": round(rig.jitter, 4), "dropped": round(rig.dropped, 4),
         "lost_poses": round(rig.lost_poses, 4), "own_rows": rig.own_rows, "force_mean": rig.force_mean, "skew_s": rig.skew_s,
         "noise": rig.noise, "noise_stated": sorted(rig.noise_stated), "episodes": kept, "planned": len(plan), "rows": rows,
         "seconds": round(sum(e.seconds for e in plan), 2),

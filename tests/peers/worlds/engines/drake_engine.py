@@ -1,7 +1,6 @@
 """Drake: discrete contact by convex optimisation (SAP), with point contacts or hydroelastic patches, and TAMSI.
 
-A pair of shapes has one contact point: the object stands on small balls in its corners or rims.
-"""
+A pair of shapes has one contact point: the object stands on small balls in its corners or rims."""
 
 import math
 
@@ -52,7 +51,8 @@ class Engine:
         self.tool_kgm2 = self.tool_kg * b.tool_radius_m ** 2
         tools = plant.AddModelInstance("tools")
         self.tool = self.add(plant, "tool", self.tool_kg, np.zeros(3), np.eye(3) * self.tool_kgm2, tools)
-        ball = plant.RegisterCollisionGeometry(self.tool, RigidTransform(), Sphere(b.tool_radius_m), "tool", self.material(b.tool_friction / 2, rigid=True))
+        ball = plant.RegisterCollisionGeometry(self.tool, RigidTransform(), Sphere(b.tool_radius_m), "tool",
+                                               self.material(b.tool_friction / 2, rigid=True))
         if b.obstacle:
             o = b.obstacle
             at = RigidTransform([o["x_m"], o["y_m"], o["height_m"] / 2])
@@ -110,8 +110,8 @@ class Engine:
         self.whole = plant.RegisterCollisionGeometry(self.object, at, shape, "object", self.material(SMOOTH, rigid=False))
         self.bears = []
         for i, foot in enumerate(self.points()):
-            ball = Sphere(self.foot_radius_m)
-            self.bears.append(plant.RegisterCollisionGeometry(self.object, RigidTransform(foot), ball, f"foot{i}", self.material(SMOOTH, rigid=False)))
+            ball, smooth = Sphere(self.foot_radius_m), self.material(SMOOTH, rigid=False)
+            self.bears.append(plant.RegisterCollisionGeometry(self.object, RigidTransform(foot), ball, f"foot{i}", smooth))
 
     def points(self):
         """Centres of the balls that it stands on; none where patches or the sphere itself bear it."""
