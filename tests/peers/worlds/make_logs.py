@@ -62,17 +62,21 @@ def draw_effects(rng, scene, rig, kind, strength, unsupported):
     return {str(name): table[str(name)](rng, scene, strength) for name in chosen}
 
 
+def stream(seed, index, engine, retry=0):
+    return np.random.default_rng([seed, index, zlib.crc32(engine.encode()), retry])
+
+
 def draw_log(seed, index, engine, variant):
     """Scene, rig, plan, effects, their traces and how well they can be seen. Of another scene, where nothing shows in the first."""
     for retry in range(10):
         try:
-            return try_log(np.random.default_rng([seed, index, zlib.crc32(engine.encode()), retry]), engine, variant)
+            return try_log(stream(seed, index, engine, retry), engine, variant)
         except Faint:
             continue
     raise Faint(f"log {index}: nothing shows in ten scenes")
 
 
-def try_log(rng, engine, variant):
+def try_log(rng, engine, variant, simulate=simulate):
     scene = draw_scene(rng, engines.unsuitable(engine))
     rig = draw_rig(rng, scene)
     kind = str(rng.choice(list(SHARES), p=list(SHARES.values())))

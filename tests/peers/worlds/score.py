@@ -45,7 +45,7 @@ def load(folders, answers):
     for folder in folders:
         for path in sorted((folder / "truth").glob("log-*.json")):
             report = answers / folder.name / path.stem / "report.json"
-            out.append((json.loads(path.read_text()), json.loads(report.read_text()) if report.exists() else None))
+            out.append((json.loads(path.read_text()) | {"folder": folder.name}, json.loads(report.read_text()) if report.exists() else None))
     return out
 
 
@@ -98,6 +98,20 @@ def judge(truth, report):
     return row
 
 
+def by_gap(folders, judged_by):
+    """Logs that hide nothing, by how far another engine is from them: the largest mean square of a channel (gap.py)."""
+    bins = {"at most 2": [], "2 to 20": [], "20 to 200": [], "above 200": []}
+    for folder in folders:
+        path = folder / "truth" / "gap.json"
+        for name, gaps in json.loads(path.read_text()).items() if path.exists() else ():
+            row, most = judged_by.get((folder.name, name)), max(gaps.values())
+            if row:
+                list(bins.values())[sum(most > edge for edge in (2, 20, 200))].append(row)
+    lines = ["| another engine is apart by (noise variances) | logs | called none | called an effect |", "|---|---|---|---|"]
+    lines += [f"| {name} | {len(rows)} | {share(having(rows, 'none_ok'))} | {share(having(rows, 'alarm'))} |" for name, rows in bins.items()]
+    return "\n".join(lines)
+
+
 def having(rows, key):
     return [r[key] for r in rows if r[key] is not None]
 
@@ -144,8 +158,9 @@ def by_effect(judged):
     return "\n".join(lines)
 
 
-def report(pairs):
+def report(folders, pairs):
     judged = [(t, judge(t, r)) for t, r in pairs if r]
+    judged_by = {(t["folder"], t["name"]): row for t, row in judged}
     pick = lambda keep: [row for t, row in judged if keep(t)]
     engines = sorted({t["engine"] for t, _ in judged})
     variants = sorted({(t["engine"], t["variant"]) for t, _ in judged})
@@ -159,7 +174,7 @@ def report(pairs):
                     ("noise stated", pick(lambda t: len(t["noise_stated"]) == len(t["noise"]))),
                     ("not stated", pick(lambda t: not t["noise_stated"])),
                     ("in the catalogue's range", pick(lambda t: bool(t["effects"]) and all(e["in_range"] for e in t["effects"])))]),
-             "## By effect", by_effect(judged), "## Confidence", calibration([row for _, row in judged])]
+             "## Nothing hidden, by what engines have apart", by_gap(folders, judged_by), "## By effect", by_effect(judged), "## Confidence", calibration([row for _, row in judged])]
     return "\n\n".join(parts) + "\n"
 
 
@@ -181,7 +196,7 @@ def main():
     if not any(r for _, r in pairs):
         sys.stderr.write(f"{answers}: expected NAME-OF-DIR/log-NNN/report.json for the logs given, found none\n")
         return 2
-    text = report(pairs)
+    text = report(folders, pairs)
     print(text)
     if options.out:
         options.out.write_text(text)
