@@ -35,6 +35,9 @@ pub struct Truth {
     pub outside: Vec<serde_json::Value>,
     /// Mean square of what all of these change, in that of noise.
     pub detectable: Option<f64>,
+    /// Effects that its engine has by nature, such as the anisotropy of a pyramidal friction cone: neither right nor wrong.
+    #[serde(default)]
+    pub natural: Vec<String>,
     /// Whether its actions were chosen to tell effects apart.
     pub designed: bool,
 }
@@ -130,7 +133,7 @@ impl Example {
     }
 }
 
-/// Reads the logs of `folder` that have an answer in `answers`.
+/// Reads the logs of `folder` that have an answer in `answers`, but for those whose best effect is one that the engine has by nature.
 ///
 /// # Errors
 ///
@@ -155,6 +158,9 @@ pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
         let truth: Truth = serde_json::from_str(&text(&path)?).with_context(|| parse(&path))?;
         let answer: Answer = serde_json::from_str(&text(&report)?).with_context(|| parse(&report))?;
         let Some(findings) = answer.findings.into_iter().next() else { continue };
+        if truth.natural.contains(&findings.effect) && !truth.names(&findings.effect) {
+            continue;
+        }
         let covered = (answer.effects.iter())
             .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
             .flat_map(|(named, effect)| {
@@ -299,6 +305,7 @@ mod tests {
             effects,
             outside: Vec::new(),
             detectable: Some(if effect { 10.0 } else { 0.0 }),
+            natural: Vec::new(),
             designed: true,
         };
         let findings = Findings {

@@ -160,6 +160,11 @@ pub struct Report {
     pub seconds: f64,
 }
 
+/// Contacts that differ by less than this factor in their natural frequency are the model's.
+const FACTOR: f64 = 1.5;
+/// A number of the log that is this many standard deviations from its mean is wrong, or its spread is.
+const FAR: f64 = 4.0;
+
 impl Report {
     /// Which noise was used.
     #[must_use]
@@ -168,14 +173,50 @@ impl Report {
         format!("Noise: {}.", sentences.join("; "))
     }
 
-    /// Which clocks differ from the tool's by more than their intervals, and than clocks do.
+    /// What re-tuning found of clocks and contacts, and which numbers of the log it left far behind.
     #[must_use]
-    pub fn clock_sentences(&self) -> Vec<String> {
+    pub fn retuned_sentences(&self) -> Vec<String> {
+        [self.clock_sentences(), self.contact_sentence().into_iter().collect(), self.far_sentences()].concat()
+    }
+
+    /// How contacts differ from the model's, if they do by a factor.
+    fn contact_sentence(&self) -> Option<String> {
+        let value = self.retuned.iter().find(|value| value.key == "contact.frequency_hz")?;
+        let ([low, high], nominal) = (value.interval90, value.prior[0]);
+        let ratio = value.value / nominal;
+        let than = if ratio > 1.0 { "stiffer" } else { "softer" };
+        (ratio.ln().abs() > FACTOR.ln() && (low > nominal || high < nominal)).then(|| {
+            format!(
+                "Contacts are {than} than the model's: their natural frequency is {:.0} Hz instead of {nominal:.0} (90 %: {low:.0} to {high:.0} Hz); \
+                 re-tuned, no effect.",
+                value.value
+            )
+        })
+    }
+
+    /// Numbers of the log that re-tuning has moved beyond what their spread allows.
+    fn far_sentences(&self) -> Vec<String> {
+        let own = |value: &&Retuned| !value.key.starts_with("clock.") && !value.key.starts_with("contact.");
+        let far = |value: &Retuned| {
+            let [mean, stddev] = value.prior;
+            let by = (value.value - mean).abs() / stddev;
+            (by > FAR).then(|| {
+                format!(
+                    "Re-tuning has moved {} to {:.3}, {by:.0} standard deviations from the {mean:.3} of log.toml: check it.",
+                    value.key, value.value
+                )
+            })
+        };
+        self.retuned.iter().filter(own).filter_map(far).collect()
+    }
+
+    /// Which clocks differ from the tool's by more than their intervals, and than clocks do.
+    fn clock_sentences(&self) -> Vec<String> {
         let clock = |value: &Retuned| {
             let whose = value.key.strip_prefix("clock.")?.strip_suffix("_secs")?;
             let [low, high] = value.interval90;
             let late = if value.value > 0.0 { "late" } else { "early" };
-            (low * high > 0.0 && value.value.abs() > value.prior[1]).then(|| {
+            (low * high > 0.0 && value.value.abs() > 0.5 * value.prior[1]).then(|| {
                 let [ms, low, high] = [value.value, low, high].map(|secs| 1e3 * secs);
                 format!("The clock of the {whose} is {:.1} ms {late} against the tool's (90 %: {low:.1} to {high:.1} ms); re-tuned, no effect.", ms.abs())
             })
@@ -354,9 +395,12 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
                 "The model lacks {names}. With {it} the held-out error {goes} from {before:.2} to {after:.2} (noise alone gives 1)."
             )
         }
-        Verdict::None => {
+        Verdict::None if before < 1.5 => {
             format!("The re-tuned model explains this log: its held-out error is {before:.2} (noise alone gives 1).")
         }
+        Verdict::None => format!(
+            "This log shows no missing effect. Its held-out error is {before:.2} (noise alone gives 1); engines and real contacts differ by as much."
+        ),
         Verdict::Unknown if effects.is_empty() => {
             format!(
                 "The model lacks something that no effect of the catalogue explains: its held-out error is {before:.2} (noise alone gives 1)."

@@ -54,7 +54,7 @@ fn a_tool_that_is_stamped_late_is_a_skew_and_no_effect() {
             let (ms, [low, high]) = clock(&found, key);
             assert!((ms + 20.0).abs() < 3.0 && low < ms && ms < high, "{set} {key}: {ms} [{low}, {high}]");
         }
-        assert!(found.clock_sentences().iter().any(|sentence| sentence.contains("early")), "{set}");
+        assert!(found.retuned_sentences().iter().any(|sentence| sentence.contains("early")), "{set}");
     }
 }
 

@@ -81,7 +81,7 @@ fn verdict(name: &str, report: &Report, words: &Words) -> Markup {
             @if let Some(begun) = begun { (begun) }
             @if let Some(reason) = &report.reason { p.call { "Why unknown: " (reason) "." } }
             @if let Some(description) = &report.description { p.call { "What is left: " (description) "." } }
-            @for sentence in report.clock_sentences() { p.call { (sentence) } }
+            @for sentence in report.retuned_sentences() { p.call { (sentence) } }
             (facts(&numbers))
             p { b { "Next:" } " " (report.next_experiment) }
         }
