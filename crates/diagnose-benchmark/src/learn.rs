@@ -1,6 +1,6 @@
 //! How a diagnosis decides, learnt from logs of other engines: answers of `diagnose` beside the truth of each log.
 //!
-//! A folder of logs holds `log-NNN/` and `truth/log-NNN.json`, as `tests/peers/worlds/make_logs.py` writes them; answers lie in `ANSWERS/FOLDER/log-NNN/report.json`.
+//! Logs of other engines: a folder holds `log-NNN/` and `truth/log-NNN.json`, as `tests/peers/worlds/make_logs.py` writes them; answers lie in `ANSWERS/FOLDER/log-NNN/report.json`.
 //! What is learnt is judged on the engine that was left out, each in turn.
 
 use std::collections::BTreeMap;
@@ -9,9 +9,13 @@ use std::path::Path;
 use anyhow::{Context as _, Result};
 use discrepancy::decision::{Decision, FEATURES, Probabilities, features};
 use discrepancy::findings::Findings;
+use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
 
+use crate::folder::{Identity, name};
+use crate::generate::Actions;
 use crate::logistic;
+use crate::plan::{self, Plan};
 
 /// Prior variance of a weight of a standardised feature.
 const VARIANCE: f64 = 1.0;
@@ -49,7 +53,7 @@ pub struct Named {
     pub name: String,
     /// Values by the keys of its parameters.
     #[serde(default)]
-    pub parameters: BTreeMap<String, f64>,
+    pub parameters: BTreeMap<String, serde_json::Value>,
 }
 
 /// What a right answer is.
@@ -139,7 +143,10 @@ impl Example {
 ///
 /// Where a file cannot be read.
 pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
-    let name = folder.file_name().context("expected the name of a folder of logs")?;
+    if folder.join("plan.json").exists() {
+        return read_own(folder);
+    }
+    let folder_name = folder.file_name().context("expected the name of a folder of logs")?;
     let truths = folder.join("truth");
     let listed = std::fs::read_dir(&truths).with_context(|| format!("cannot read {}", truths.display()))?;
     let mut paths: Vec<_> = listed.filter_map(|entry| Some(entry.ok()?.path())).collect();
@@ -148,33 +155,67 @@ pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
     let mut examples = Vec::new();
     for path in paths {
         let Some(log) = path.file_stem() else { continue };
-        let report = answers.join(name).join(log).join("report.json");
+        let report = answers.join(folder_name).join(log).join("report.json");
         if !report.exists() {
             continue;
         }
-        let text =
-            |path: &Path| std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()));
-        let parse = |path: &Path| format!("{}: expected what this version writes", path.display());
-        let truth: Truth = serde_json::from_str(&text(&path)?).with_context(|| parse(&path))?;
-        let answer: Answer = serde_json::from_str(&text(&report)?).with_context(|| parse(&report))?;
-        let Some(findings) = answer.findings.into_iter().next() else { continue };
-        if truth.natural.contains(&findings.effect) && !truth.names(&findings.effect) {
-            continue;
-        }
-        let covered = (answer.effects.iter())
-            .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
-            .flat_map(|(named, effect)| {
-                let holds = |value: &Value| {
-                    let [low, high] = value.interval90;
-                    effect.parameters.get(&value.key).map(|truth| (low..=high).contains(truth))
-                };
-                named.parameters.iter().filter_map(holds).collect::<Vec<_>>()
-            })
-            .collect();
-        let log = format!("{}/{}", name.display(), log.display());
-        examples.push(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds });
+        let log = format!("{}/{}", folder_name.display(), log.display());
+        examples.extend(example(log, crate::folder::read(&path)?, crate::folder::read(&report)?));
     }
     Ok(examples)
+}
+
+/// Reads a folder of `diagnose-benchmark`, which holds its answers: logs of our own engine with other settings.
+fn read_own(folder: &Path) -> Result<Vec<Example>> {
+    let identity: Identity = crate::folder::read(&folder.join("plan.json"))?;
+    let plan = Plan::new(identity.options.clone());
+    let mut examples = Vec::new();
+    for set in 0..plan.len() {
+        let [truth, report] = ["truth", "answers"].map(|part| folder.join(part).join(name(set)));
+        let (truth, report) = (truth.with_extension("json"), report.join("report.json"));
+        if !truth.exists() || !report.exists() {
+            continue;
+        }
+        let own: plan::Truth = crate::folder::read(&truth)?;
+        let named = |effect: &EffectConfig| Named {
+            name: effect.kind().name().into(),
+            parameters: (effect.kind().parameters().iter().zip(effect.values()))
+                .map(|(parameter, value)| (parameter.name.to_string(), value.into()))
+                .collect(),
+        };
+        let truth = Truth {
+            engine: "rapier".into(),
+            variant: "other settings".into(),
+            seed: identity.options.seed,
+            effects: own.spec.effects.iter().map(named).collect(),
+            outside: own.spec.unknown.iter().map(|unknown| serde_json::Value::from(unknown.name())).collect(),
+            // They begin where they show.
+            detectable: Some(f64::INFINITY),
+            natural: Vec::new(),
+            designed: own.spec.actions == Actions::Designed,
+        };
+        examples.extend(example(format!("rapier/{}", name(set)), truth, crate::folder::read(&report)?));
+    }
+    Ok(examples)
+}
+
+/// Nothing of an answer whose best effect is one that the engine has by nature.
+fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
+    let findings = answer.findings.into_iter().next()?;
+    if truth.natural.contains(&findings.effect) && !truth.names(&findings.effect) {
+        return None;
+    }
+    let covered = (answer.effects.iter())
+        .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
+        .flat_map(|(named, effect)| {
+            let holds = |value: &Value| {
+                let [low, high] = value.interval90;
+                effect.parameters.get(&value.key)?.as_f64().map(|truth| (low..=high).contains(&truth))
+            };
+            named.parameters.iter().filter_map(holds).collect::<Vec<_>>()
+        })
+        .collect();
+    Some(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds })
 }
 
 /// The regression that examples teach.

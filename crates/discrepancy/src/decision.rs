@@ -13,7 +13,7 @@ use crate::findings::Findings;
 use crate::report::Verdict;
 
 /// Names of the features, in order.
-pub const FEATURES: [&str; 11] = [
+pub const FEATURES: [&str; 12] = [
     "ln evidence",
     "ln margin",
     "steadiness",
@@ -25,6 +25,18 @@ pub const FEATURES: [&str; 11] = [
     "ln motion share",
     "ln force share",
     "ln size",
+    "contact law",
+];
+
+/// Effects in which engines, and real contacts, differ from each other by nature: how a sole bears, sticks, slides, bounces and parts.
+const CONTACT_LAWS: [&str; 7] = [
+    "pressure_distribution",
+    "restitution",
+    "static_friction",
+    "stribeck_friction",
+    "anisotropic_friction",
+    "edge_rounding",
+    "adhesion",
 ];
 
 /// What the feature vector of findings is, in the order of [`FEATURES`].
@@ -46,6 +58,7 @@ pub fn features(findings: &Findings) -> [f64; FEATURES.len()] {
         logarithm(findings.motion_share[1], 1e-3),
         logarithm(findings.force_share[1], 1e-2),
         logarithm(findings.size, 1e-2),
+        f64::from(u8::from(CONTACT_LAWS.contains(&findings.effect.as_str()))),
     ]
 }
 
