@@ -10,6 +10,7 @@ use physics_model::effect::signal::Blend as _;
 use physics_model::rig::RigReading;
 
 use crate::model::STEP;
+use crate::trial::Kind;
 
 /// Standard deviation of a skew, s: a frame of a fast camera.
 pub(crate) const STDDEV_SECS: f64 = 0.005;
@@ -36,6 +37,17 @@ impl Clock {
         }
     }
 
+    /// Whether it stamps a channel.
+    pub(crate) fn stamps(self, channel: Kind) -> bool {
+        use Kind as K;
+        match self {
+            Self::Object => {
+                matches!(channel, K::ObjectPosition | K::ObjectOrientation | K::ObjectVelocity | K::ObjectSpin)
+            }
+            Self::Force => matches!(channel, K::WristForce | K::WristTorque),
+        }
+    }
+
     /// Whether an effect says the same and more.
     pub(crate) fn gives_way_to(self, kind: EffectKind) -> bool {
         match self {
@@ -43,6 +55,11 @@ impl Clock {
             Self::Force => kind == EffectKind::ForceDelay,
         }
     }
+}
+
+/// Coordinates to begin from: a contact begins within a tick, and a descent does not see one that begins beyond it.
+pub(crate) fn grid() -> impl Iterator<Item = f64> {
+    (RANGE[0] as i32..=RANGE[1] as i32).map(f64::from)
 }
 
 /// Step of a finite difference at `z`, away from the border.

@@ -165,6 +165,24 @@ impl<'a> Simulator<'a> {
         (first, readings)
     }
 
+    /// Residuals of the episode at `index` with each clock by itself at each of `grid`, by one simulation: clock, place on the grid, residuals.
+    pub(crate) fn scanned(
+        &self,
+        hypothesis: &Hypothesis,
+        engine: &Engine,
+        index: usize,
+        grid: &[f64],
+    ) -> Vec<Vec<Vec<f64>>> {
+        let trial = &self.trials[index];
+        let (first, readings) = self.run(hypothesis, engine, Nudge::default(), trial);
+        let at = |clock: usize, z: f64| {
+            let mut hypothesis = hypothesis.clone();
+            hypothesis.z[clock] = z;
+            trial.residuals(&first, &self.stamped(&hypothesis, &first, readings.clone()))
+        };
+        (0..self.nominal.clocks()).map(|clock| grid.iter().map(|z| at(clock, *z)).collect()).collect()
+    }
+
     fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, index: usize) -> Vec<f64> {
         let (trial, clocks) = (&self.trials[index], self.nominal.clocks());
         let plain = clocks > 0 && nudge == Nudge::default() && *engine == self.nominal.engine();
