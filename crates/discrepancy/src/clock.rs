@@ -10,6 +10,10 @@ use physics_model::effect::signal::Blend as _;
 use physics_model::rig::RigReading;
 
 use crate::model::STEP;
+use crate::trial::Kind;
+
+/// Spacing of the coordinates that are looked at, in standard deviations.
+const SPACING: f64 = 0.5;
 
 /// A clock that differs from the tool's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +54,23 @@ impl Clock {
     /// Step of a finite difference at `z`, away from the border.
     pub(crate) fn step(self, z: f64) -> f64 {
         if z + STEP <= self.range()[1] { STEP } else { -STEP }
+    }
+
+    /// Coordinates to begin from: a contact begins within a tick, and a descent does not see one that begins beyond it.
+    pub(crate) fn grid(self) -> Vec<f64> {
+        let [from, to] = self.range();
+        (0..=((to - from) / SPACING) as u32).map(|place| from + SPACING * f64::from(place)).collect()
+    }
+
+    /// Whether it stamps a channel.
+    pub(crate) fn stamps(self, channel: Kind) -> bool {
+        use Kind as K;
+        match self {
+            Self::Object => {
+                matches!(channel, K::ObjectPosition | K::ObjectOrientation | K::ObjectVelocity | K::ObjectSpin)
+            }
+            Self::Force => matches!(channel, K::WristForce | K::WristTorque),
+        }
     }
 
     /// Whether an effect says the same and more.

@@ -27,7 +27,7 @@ use crate::report::Verdict;
 use crate::rival::Round;
 use crate::screen::{Screening, places};
 use crate::search::Search;
-use crate::simulator::Simulator;
+use crate::simulator::{Hypothesis, Simulator};
 use crate::split::{Compared, HeldOut, LEAST_FITTED, Split, ranking};
 use crate::stamps::period_secs;
 use crate::study::Study;
@@ -380,8 +380,9 @@ fn conclude(
 /// The null hypothesis, re-tuned, and the episodes of the screening, with errors learnt near it.
 fn null_model<'a>(study: &Study<'a>) -> (Fit, Study<'a>, Vec<usize>) {
     let (tunables, clocks) = (study.simulator.nominal.tunables.len(), study.simulator.nominal.clocks());
-    let first =
-        fit(study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let mut begin = Hypothesis { z: vec![0.0; tunables], effects: Vec::new() };
+    study.set_clocks(&mut begin);
+    let first = fit(study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&begin.z), Effort::Quick);
     let places = places(study, &first);
     let mut part = study.part(&places);
     part.learn_errors(&first.model.hypothesis(&first.x));

@@ -184,6 +184,24 @@ impl<'a> Simulator<'a> {
         chosen.par_iter().map(one).collect()
     }
 
+    /// Residuals of the episode at `index` with each clock by itself all along its grid, by one simulation: clock, place on the grid, residuals.
+    pub(crate) fn scanned(
+        &self,
+        hypothesis: &Hypothesis,
+        engine: &Engine,
+        index: usize,
+    ) -> Vec<Vec<Vec<f64>>> {
+        let trial = &self.trials[index];
+        let (first, readings) = self.run(hypothesis, engine, Nudge::default(), trial);
+        let at = |clock: usize, z: f64| {
+            let mut hypothesis = hypothesis.clone();
+            hypothesis.z[clock] = z;
+            trial.residuals(&first, &self.stamped(&hypothesis, &first, readings.clone()))
+        };
+        let all = |clock: usize| Clock::ALL[clock].grid().into_iter().map(|z| at(clock, z)).collect();
+        (0..self.nominal.clocks()).map(all).collect()
+    }
+
     fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, index: usize) -> Vec<f64> {
         let (trial, clocks) = (&self.trials[index], self.nominal.clocks());
         let plain = clocks > 0 && nudge == Nudge::default() && *engine == self.nominal.engine();

@@ -4,10 +4,12 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use crate::budget::Budget;
 use crate::cells::{Key, Times, key};
-use crate::likelihood::{Cells, Stack};
+use crate::clock::Clock;
+use crate::likelihood::{Cells, Stack, episode_cost};
 use crate::nominal::Engine;
 use crate::simulator::{Hypothesis, Nudge, Simulator};
 use crate::trial::{Phase, groups};
@@ -107,6 +109,31 @@ impl<'a> Study<'a> {
             self.charge();
         }
         self.simulator.residuals(hypothesis, &self.engine, Nudge::default(), &self.chosen)
+    }
+
+    /// Sets the clocks of a hypothesis to where what each stamps is explained best.
+    pub(crate) fn set_clocks(&self, hypothesis: &mut Hypothesis) {
+        if self.simulator.nominal.clocks() == 0 {
+            return;
+        }
+        let scan = |index: &usize| self.simulator.scanned(hypothesis, &self.engine, *index);
+        let scanned: Vec<_> = self.chosen.par_iter().map(scan).collect();
+        for (place, clock) in Clock::ALL.into_iter().enumerate().take(self.simulator.nominal.clocks()) {
+            let grid = clock.grid();
+            let cost = |at: usize| -> f64 {
+                let episode = |(index, scanned): (&usize, &Vec<Vec<Vec<f64>>>)| {
+                    let blocks = self.simulator.trials[*index].blocks.iter().zip(&scanned[place][at]);
+                    let own =
+                        blocks.filter(|(block, _)| clock.stamps(block.kind)).map(|(_, residual)| huber(*residual));
+                    let (square, count) = own.fold((0.0, 0), |(sum, n), residual| (sum + residual * residual, n + 1));
+                    episode_cost(square, count)
+                };
+                self.chosen.iter().zip(&scanned).map(episode).sum::<f64>() + 0.5 * grid[at] * grid[at]
+            };
+            let costs: Vec<f64> = (0..grid.len()).map(cost).collect();
+            let best = (0..grid.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+            hypothesis.z[place] = best.map_or(0.0, |best| grid[best]);
+        }
     }
 
     /// Adds `sizes` of the engine's errors to residuals, makes them white, and large ones count by their size instead of its square (Huber):
