@@ -199,8 +199,12 @@ fn read_own(folder: &Path) -> Result<Vec<Example>> {
     Ok(examples)
 }
 
-/// Nothing of an answer whose best effect is one that the engine has by nature.
+/// Nothing of an answer whose best effect is one that the engine has by nature, or of a log whose engine could not say what is hidden changes.
 fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
+    let hides = !truth.effects.is_empty() || !truth.outside.is_empty();
+    if hides && truth.detectable.is_none() {
+        return None;
+    }
     let findings = answer.findings.into_iter().next()?;
     if truth.natural.contains(&findings.effect) && !truth.names(&findings.effect) {
         return None;
