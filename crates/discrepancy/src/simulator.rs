@@ -185,12 +185,7 @@ impl<'a> Simulator<'a> {
     }
 
     /// Residuals of the episode at `index` with each clock by itself all along its grid, by one simulation: clock, place on the grid, residuals.
-    pub(crate) fn scanned(
-        &self,
-        hypothesis: &Hypothesis,
-        engine: &Engine,
-        index: usize,
-    ) -> Vec<Vec<Vec<f64>>> {
+    pub(crate) fn scanned(&self, hypothesis: &Hypothesis, engine: &Engine, index: usize) -> Vec<Vec<Vec<f64>>> {
         let trial = &self.trials[index];
         let (first, readings) = self.run(hypothesis, engine, Nudge::default(), trial);
         let at = |clock: usize, z: f64| {

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 use diagnose_benchmark::learn::{Example, Judged, judge, learn, leave_one_engine_out, read};
-use discrepancy::decision::Probabilities;
+use discrepancy::decision::{Decision, Probabilities};
 use program::Failed;
 use serde::Serialize;
 use statistics::wilson95;
@@ -29,11 +29,15 @@ struct Arguments {
     /// Folder for the table of each engine, left out of what judges it.
     #[arg(long)]
     table: Option<PathBuf>,
+    /// Judges by this decision, which was made from other logs, instead of learning one: unseen logs.
+    #[arg(long, conflicts_with = "out")]
+    unseen: Option<PathBuf>,
 }
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask diagnose-learn runs/worlds/mujoco-all-seed11 runs/worlds/bullet-all-seed11 --answers runs/worlds-answers --table runs/worlds-table";
+  cargo xtask diagnose-learn runs/worlds/mujoco-all-seed11 runs/worlds/bullet-all-seed11 --answers runs/answers --table runs/table
+  cargo xtask diagnose-learn runs/worlds/mujoco-all-seed501 --answers runs/answers --unseen assets/diagnose/decision.json";
 
 /// The table.
 #[derive(Serialize)]
@@ -56,7 +60,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let mut engines: Vec<String> = examples.iter().map(|example| example.truth.engine.clone()).collect();
     engines.sort_unstable();
     engines.dedup();
-    if engines.len() < 2 {
+    if arguments.unseen.is_none() && engines.len() < 2 {
         bail!(
             "expected answers on logs of two engines or more, found {} logs of {} engines",
             examples.len(),
@@ -64,7 +68,10 @@ fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     let provenance = provenance(arguments, &examples);
-    let judged = leave_one_engine_out(&examples);
+    let judged = match &arguments.unseen {
+        Some(path) => unseen(path, &examples)?,
+        None => leave_one_engine_out(&examples),
+    };
     let of = |engine: &str| -> Vec<(&Example, Probabilities)> {
         judged.iter().filter(|(example, _)| engine.is_empty() || example.truth.engine == engine).copied().collect()
     };
@@ -76,8 +83,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     if let Some(folder) = &arguments.table {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
         let json = serde_json::to_string_pretty(&table)? + "\n";
-        for (file, text) in [("worlds.md", &text), ("worlds.json", &json)] {
-            write(&folder.join(file), text)?;
+        let name = if arguments.unseen.is_some() { "unseen" } else { "worlds" };
+        for (extension, text) in [("md", &text), ("json", &json)] {
+            write(&folder.join(name).with_extension(extension), text)?;
         }
     }
     if let Some(out) = &arguments.out {
@@ -85,6 +93,24 @@ fn run(arguments: &Arguments) -> Result<()> {
         write(out, &(serde_json::to_string_pretty(&learn(&all, provenance))? + "\n"))?;
     }
     Ok(())
+}
+
+/// Every example with the probabilities of a decision that was made from other logs.
+fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<(&'a Example, Probabilities)>> {
+    let decision: Decision = diagnose_benchmark::folder::read(path)?;
+    let seen = |example: &Example| {
+        let sets = decision.provenance["sets"].as_array();
+        sets.into_iter().flatten().any(|set| set["seed"].as_u64() == Some(example.truth.seed))
+    };
+    if let Some(example) = examples.iter().find(|example| seen(example)) {
+        bail!(
+            "{}: seed {} served to make {}: expected logs of another seed",
+            example.log,
+            example.truth.seed,
+            path.display()
+        );
+    }
+    Ok(examples.iter().map(|example| (example, decision.probabilities(&example.findings))).collect())
 }
 
 fn write(path: &std::path::Path, text: &str) -> Result<()> {
@@ -119,7 +145,7 @@ fn provenance(arguments: &Arguments, examples: &[Example]) -> serde_json::Value 
 
 fn markdown(table: &Table) -> String {
     let mut text = String::from(
-        "| engine left out | logs | named, of effects that show | best effect is the hidden one | `none` called `none` | false alarm | outside called `unknown` | wrong and ≥ 0.9 sure | 90 % intervals cover | calibration error | episodes simulated | s |\n\
+        "| engine | logs | named, of effects that show | best effect is the hidden one | `none` called `none` | false alarm | outside called `unknown` | wrong and ≥ 0.9 sure | 90 % intervals cover | calibration error | episodes simulated | s |\n\
          |---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     let share = |part: u32, whole: u32| {
