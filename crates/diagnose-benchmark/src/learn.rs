@@ -17,8 +17,8 @@ use crate::generate::Actions;
 use crate::logistic;
 use crate::plan::{self, Plan};
 
-/// Prior variance of a weight of a standardised feature.
-const VARIANCE: f64 = 1.0;
+/// Prior variances of a weight of a standardised feature, of which the one is taken that predicts engines best that were left out.
+const VARIANCES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
 /// A mean square difference, in those of noise, by which an effect changes its episodes, below which nothing shows.
 const DETECTABLE: f64 = 3.0;
 /// What is re-tuned like a mass is no effect that a diagnosis names.
@@ -222,9 +222,36 @@ fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
     Some(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds })
 }
 
-/// The regression that examples teach.
+/// The regression that examples teach. How far weights may go is what predicts best the engines among them that are left out, each in turn.
 #[must_use]
 pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
+    let loss = |variance: f64| -> f64 {
+        let left_out = |engine: &&str| -> f64 {
+            let (own, others): (Vec<&Example>, Vec<&Example>) =
+                examples.iter().copied().partition(|example| example.truth.engine == **engine);
+            let decision = regress(&others, variance, serde_json::Value::Null);
+            own.iter().map(|example| -of_label(&decision.probabilities(&example.findings), example).ln()).sum()
+        };
+        engines(examples).iter().map(left_out).sum()
+    };
+    let best = VARIANCES.into_iter().map(|variance| (loss(variance), variance)).min_by(|a, b| a.0.total_cmp(&b.0));
+    regress(examples, best.map_or(VARIANCES[0], |(_, variance)| variance), provenance)
+}
+
+/// The engines of examples, each once.
+fn engines<'a>(examples: &[&'a Example]) -> Vec<&'a str> {
+    let mut engines: Vec<&str> = examples.iter().map(|example| example.truth.engine.as_str()).collect();
+    engines.sort_unstable();
+    engines.dedup();
+    engines
+}
+
+/// The probability of what an example teaches.
+fn of_label(found: &Probabilities, example: &Example) -> f64 {
+    [found.effect, found.none, found.unknown][example.label()]
+}
+
+fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) -> Decision {
     let rows: Vec<[f64; FEATURES.len()]> = examples.iter().map(|example| features(&example.findings)).collect();
     let n = rows.len().max(1) as f64;
     let scale = |index: usize| {
@@ -239,7 +266,7 @@ pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
     };
     let standard: Vec<Vec<f64>> = rows.iter().map(standard).collect();
     let labels: Vec<usize> = examples.iter().map(|example| example.label()).collect();
-    let mut classes = logistic::fit(&standard, &labels, 3, VARIANCE).into_iter();
+    let mut classes = logistic::fit(&standard, &labels, 3, variance).into_iter();
     let mut next = || classes.next().unwrap_or_default();
     Decision { provenance, features: scales, classes: [next(), next(), next()] }
 }
@@ -247,16 +274,13 @@ pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
 /// Every example with the probabilities of what the other engines teach.
 #[must_use]
 pub fn leave_one_engine_out(examples: &[Example]) -> Vec<(&Example, Probabilities)> {
-    let mut engines: Vec<&str> = examples.iter().map(|example| example.truth.engine.as_str()).collect();
-    engines.sort_unstable();
-    engines.dedup();
     let judged = |engine: &str| {
         let others: Vec<&Example> = examples.iter().filter(|example| example.truth.engine != engine).collect();
         let decision = learn(&others, serde_json::Value::Null);
         let own = examples.iter().filter(|example| example.truth.engine == engine);
         own.map(|example| (example, decision.probabilities(&example.findings))).collect::<Vec<_>>()
     };
-    engines.into_iter().flat_map(judged).collect()
+    engines(&examples.iter().collect::<Vec<_>>()).into_iter().flat_map(judged).collect()
 }
 
 /// Counts of what is judged.
@@ -322,8 +346,7 @@ pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
             counts.intervals[0] += example.covered.len() as u32;
             counts.intervals[1] += example.covered.iter().filter(|covered| **covered).count() as u32;
         }
-        let probability = [found.effect, found.none, found.unknown][label];
-        counts.log_loss -= probability.ln() / judged.len() as f64;
+        counts.log_loss -= of_label(found, example).ln() / judged.len() as f64;
         counts.rollouts += example.rollouts as f64 / judged.len() as f64;
         counts.seconds += example.seconds / judged.len() as f64;
     }
