@@ -73,8 +73,14 @@ impl<'a> Agent<'a> {
     fn play(&mut self, world: &mut dyn World, seed: Seed, log: &mut EpisodeLog<'_>) -> Result<End, Error> {
         let (observation, joints_rad) = world.reset()?;
         // 1: Initialize belief b(s, Θ) over state s and physical parameters Θ.
-        let mut controller =
-            controller(self.problem, self.method, self.prior.as_mut(), (&observation, &joints_rad), seed)?;
+        let first = (&observation, joints_rad.as_slice());
+        let mut controller = match controller(self.problem, self.method, self.prior.as_mut(), first, seed) {
+            Err(Error::Belief(belief::Error::Depleted { attempts, .. })) => {
+                log.begin(&joints_rad, world.truth(), None);
+                return Ok(End::OutOfParticles { transitions: attempts });
+            }
+            made => made?,
+        };
         log.begin(&joints_rad, world.truth(), controller.belief());
         // 2: repeat
         for remaining in (1..=self.problem.scenario.task.horizon).rev() {

@@ -140,6 +140,37 @@ fn an_observation_that_no_particle_explains_ends_the_episode_as_depleted() {
     assert_eq!((episode.reason, episode.steps.len(), episode.depletions), (Reason::Depleted, 1, 1));
 }
 
+/// A world whose object is first seen where the task has ended.
+struct Ended<'a>(SimulatedWorld<'a>, [f64; 2]);
+
+impl World for Ended<'_> {
+    fn reset(&mut self) -> Result<(Observation, Vec<f64>), Error> {
+        let (mut observation, joints_rad) = self.0.reset()?;
+        let at = observation.0.len() - 7;
+        observation.0[at..at + 2].copy_from_slice(&self.1);
+        Ok((observation, joints_rad))
+    }
+
+    fn act(&mut self, action: Action) -> Result<WorldStep, Error> {
+        self.0.act(action)
+    }
+
+    fn truth(&self) -> Option<&Particle> {
+        self.0.truth()
+    }
+}
+
+#[test]
+fn a_first_observation_that_no_start_explains_ends_the_episode_before_its_first_action() {
+    let problem = preset("surmise", "D1", &[]);
+    let goal = &problem.scenario.task.goal;
+    let seed = Seed(1);
+    let mut agent = Agent::new(&problem, Method::NoRnn, None).unwrap();
+    let episode = agent.run(&mut Ended(world(&problem, seed), [goal.x_m, goal.y_m]), seed).unwrap();
+    assert_eq!((episode.reason, episode.steps.len()), (Reason::Depleted, 0));
+    assert_eq!(episode.belief_errors, None, "there was no belief");
+}
+
 #[test]
 fn the_errors_of_the_first_belief_and_of_each_update_are_kept_where_there_is_a_belief_and_a_truth() {
     let problem = problem("D4", &["planner.budget={transitions=60}", "task.horizon=5"]);

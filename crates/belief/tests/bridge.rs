@@ -3,36 +3,10 @@
 mod line;
 
 use belief::{BridgeConfig, BridgeFilter, Error, Particles};
-use line::{Exact, HEIGHT, Line, NOW, SLOPE, State, log_gaussian, normal};
+use line::gaussian::Gaussian;
+use line::{Exact, HEIGHT, Kalman, Line, NOW, SLOPE, State, log_gaussian};
 use pomdp::{Purpose, Rng, Seed, Teacher, UpdateReport};
 use rand::RngExt as _;
-
-/// A Gaussian over the first `size` coordinates (x_0, slope, height / 2), by mean and Cholesky factor; the others keep the prior.
-#[derive(Clone)]
-struct Gaussian {
-    size: usize,
-    mean: [f64; 3],
-    factor: [[f64; 3]; 3],
-}
-
-impl Gaussian {
-    fn log_density(&self, z: [f64; 3]) -> f64 {
-        let mut standard = [0.0; 3];
-        let mut total = 0.0;
-        for i in 0..self.size {
-            let rest: f64 = (0..i).map(|j| self.factor[i][j] * standard[j]).sum();
-            standard[i] = (z[i] - self.mean[i] - rest) / self.factor[i][i];
-            total += log_gaussian(standard[i], 1.0) - self.factor[i][i].ln();
-        }
-        total
-    }
-
-    fn draw(&self, rng: &mut Rng) -> Vec<f64> {
-        let standard: [f64; 3] = std::array::from_fn(|_| normal(rng));
-        let correlated = |i: usize| self.mean[i] + (0..=i).map(|j| self.factor[i][j] * standard[j]).sum::<f64>();
-        (0..3).map(|i| if i < self.size { correlated(i) } else { standard[i] }).collect()
-    }
-}
 
 /// A teacher that is the exact posterior of the start, or is wrong in a known way.
 #[derive(Clone)]
@@ -50,23 +24,12 @@ impl Guess {
     fn wrong(line: &Line, shift: f64, width: f64, doubt: f64) -> Self {
         let exact = Exact::new(line);
         let part = |class: usize| {
-            let kalman = &exact.parts[class];
-            let unit = [1.0, 1.0, HEIGHT];
-            let mut mean: [f64; 3] = std::array::from_fn(|i| kalman.mean[1 + i] / unit[i]);
-            let covariance = |i: usize, j: usize| kalman.covariance[1 + i][1 + j] / (unit[i] * unit[j]);
-            let mut factor = [[0.0_f64; 3]; 3];
-            let size = 2 + class;
-            for i in 0..size {
-                for j in 0..=i {
-                    let rest = covariance(i, j) - (0..j).map(|k| factor[i][k] * factor[j][k]).sum::<f64>();
-                    factor[i][j] = if i == j { rest.sqrt() } else { rest / factor[j][j] };
-                }
+            let mut part = Gaussian::of(&exact.parts[class], 2 + class, [1.0, 1.0, HEIGHT]);
+            for i in 0..part.size {
+                part.mean[i] += shift * part.factor[i][0];
+                part.factor[i].iter_mut().for_each(|value| *value *= width);
             }
-            for i in 0..size {
-                mean[i] += shift * factor[i][0];
-                factor[i].iter_mut().for_each(|value| *value *= width);
-            }
-            Gaussian { size, mean, factor }
+            part
         };
         let second = (1.0 - doubt) * exact.second + doubt * line.second();
         Self { second: (second, line.second()), parts: [part(0), part(1)], impossible: 0.0 }
@@ -78,6 +41,28 @@ impl Guess {
 
     fn prior(line: &Line) -> Self {
         Self::exact(&Line::new(line.q, line.r, line.second()))
+    }
+}
+
+impl Guess {
+    /// q^(1 − power) p^power of this teacher q and the posterior p of a line without a walk, as if it were a posterior.
+    fn bridge(&self, line: &Line, power: f64) -> Exact {
+        let (posterior, steps) = (Self::exact(line), line.readings.len() as f64);
+        let both = [0, 1].map(|class| Gaussian::between(&self.parts[class], &posterior.parts[class], power));
+        let of = |guess: &Self, class: usize| if class == 1 { guess.second.0 } else { 1.0 - guess.second.0 };
+        let mass =
+            |class: usize| of(self, class).powf(1.0 - power) * of(&posterior, class).powf(power) * both[class].1.exp();
+        let second = mass(1) / (mass(0) + mass(1));
+        let parts = both.each_ref().map(|(part, _)| {
+            let (m, c) = (part.mean, part.covariance());
+            let mut kalman = Kalman { mean: [0.0; 4], covariance: [[0.0; 4]; 4], log_evidence: f64::NAN };
+            // The present value is x_0 + steps × slope.
+            kalman.mean[NOW] = m[0] + steps * m[1];
+            kalman.covariance[NOW][NOW] = c[0][0] + 2.0 * steps * c[0][1] + steps * steps * c[1][1];
+            (kalman.mean[SLOPE], kalman.covariance[SLOPE][SLOPE]) = (m[1], c[1][1]);
+            kalman
+        });
+        Exact { parts, second }
     }
 }
 
@@ -113,6 +98,8 @@ struct Found {
     truth: State,
     belief: Particles<State>,
     exact: Exact,
+    /// The exact bridge from the last teacher to the posterior, at the exponent that was reached; without a walk alone.
+    bridge: Exact,
     /// ln p of all readings.
     log_evidence: f64,
     reports: Vec<UpdateReport>,
@@ -129,9 +116,11 @@ fn episode(setting: &Setting<'_>, item: u64) -> Found {
         line.act(&mut truth, &mut rng);
         filter.update(&line, (setting.teacher)(&line), &mut filter_rng).unwrap()
     });
-    let reports = reports.collect();
+    let reports: Vec<UpdateReport> = reports.collect();
     let exact = Exact::new(&line);
-    Found { truth, belief: filter.belief().unwrap(), log_evidence: exact.log_evidence(&line), exact, reports }
+    let bridge = (setting.teacher)(&line).bridge(&line, reports.last().unwrap().temperature);
+    let (belief, log_evidence) = (filter.belief().unwrap(), exact.log_evidence(&line));
+    Found { truth, belief, log_evidence, exact, bridge, reports }
 }
 
 fn episodes(setting: &Setting<'_>, count: u64) -> Vec<Found> {
@@ -270,6 +259,32 @@ fn too_few_draws_show_as_width() {
         // A calibrated belief covers 90 %, and of 300 episodes less than 85 % with probability 0.003. The posterior's own variance would be a ratio of 1.
         assert!(covered >= 0.85, "{covered}");
         assert!(ratio > 1.5, "{ratio}");
+    }
+}
+
+#[test]
+fn what_lies_between_a_teacher_and_the_posterior_is_exact_too() {
+    // A teacher that is broad, off and in doubt, so that neither end is near. Where earlier ones are kept, which err to the other side, draws come
+    // from another density than the last teacher's.
+    let teacher = |line: &Line| {
+        let side = if line.readings.len() % 2 == 1 { -2.0 } else { 2.0 };
+        Guess::wrong(line, side, 1.8, 0.6)
+    };
+    for (kept, effective) in [(1, 600.0), (3, 900.0)] {
+        let config = BridgeConfig { draws: 1000, kept, effective };
+        let mut found = episodes(&Setting { q: 0.0, steps: 5, config, teacher: &teacher }, 60);
+        let powers: Vec<f64> = found.iter().map(|f| f.last().temperature).collect();
+        assert!(powers.iter().all(|power| (0.1..0.9).contains(power)), "{powers:?}");
+        // The posterior itself would be refused: averages are held to about 0.02 of its spreads.
+        let away = |f: &Found| {
+            let ((posterior, variance), (between, _)) = (f.exact.moments(SLOPE), f.bridge.moments(SLOPE));
+            (posterior - between) / variance.sqrt()
+        };
+        let (mean, error) = mean_and_error(&found.iter().map(away).collect::<Vec<_>>());
+        println!("the posterior's slope is {mean:.3} ± {error:.3} spreads away");
+        assert!(mean.abs() > 0.1, "{mean}");
+        found.iter_mut().for_each(|f| std::mem::swap(&mut f.exact, &mut f.bridge));
+        assert_exact(&found, effective);
     }
 }
 

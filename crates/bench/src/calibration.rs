@@ -85,7 +85,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
         }
         let world = episode::play(&problem, &network, pomdp::Seed(task.seed), number)?;
         whole_file::write(&path, serde_json::to_string(&world)?.as_bytes(), Existing::Replace)?;
-        note(&format!("world {number}: {} after {} actions", world.reason, world.filter.len() - 1));
+        note(&format!("world {number}: {} after {} actions", world.reason, world.filter.len().saturating_sub(1)));
         Ok(world)
     };
     let worlds: Vec<World> = (0..task.worlds).into_par_iter().map(world).collect::<Result<_>>()?;

@@ -110,17 +110,20 @@ pub use suggest::Suggester;
 #[cfg(feature = "training")]
 pub use train::{Trainer, curve_csv, is_held_out};
 
-/// The default network of a program, whose folder has one of `names`, the first that there is: trained here (with `quick` a quickly trained one
-/// first), else shipped.
+/// The default network of a program, whose folder has one of `names`, the best one first. With `quick`, what was trained quickly comes before all
+/// others. Else a better name comes before a worse one, and for each name what was trained here before what is shipped: a network of your own for
+/// all mobilities of the obstacle does not replace the shipped one for the mobility at hand.
 #[must_use]
 pub fn default_folder(root: &std::path::Path, names: &[impl AsRef<str>], quick: bool) -> std::path::PathBuf {
-    let quick = quick.then_some("runs/quick/priors");
-    let places = quick.into_iter().chain(["runs/priors", "assets/priors"]);
-    let mut folders = places.flat_map(|place| names.iter().map(move |name| root.join(place).join(name.as_ref())));
+    let folder = |place: &str, name: &str| root.join(place).join(name);
+    let quick = names.iter().filter(|_| quick).map(|name| folder("runs/quick/priors", name.as_ref()));
+    let places = ["runs/priors", "assets/priors"];
+    let full = names.iter().flat_map(|name| places.map(|place| folder(place, name.as_ref())));
     let last = names.last().map_or("", AsRef::as_ref);
-    folders
+    quick
+        .chain(full)
         .find(|folder| folder.join(checkpoint::FILE).is_file())
-        .unwrap_or_else(|| root.join("assets/priors").join(last))
+        .unwrap_or_else(|| folder("assets/priors", last))
 }
 
 /// The project folder that a command line names, or the nearest one at or above `start`, else `start`. The programs of this crate need no

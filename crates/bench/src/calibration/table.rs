@@ -69,7 +69,12 @@ fn rows(summary: &Value, text: &mut String, cells: impl Fn(&Value) -> Vec<String
 }
 
 fn number(value: &Value, digits: usize) -> String {
-    value.as_f64().map_or("–".into(), |v| format!("{v:.digits$}"))
+    let text = value.as_f64().map_or("–".into(), |v| format!("{v:.digits$}"));
+    // What rounds to zero has no sign.
+    match text.strip_prefix('-') {
+        Some(zero) if zero.chars().all(|c| c == '0' || c == '.') => zero.into(),
+        _ => text,
+    }
 }
 
 fn interval(value: &Value, digits: usize) -> String {
