@@ -323,7 +323,7 @@ fn conclude(
         findings.insert(0, Findings::of_nothing(search, &null, &episodes));
     }
     let Decided { verdict, probabilities, confidences, model: accepted, reason } =
-        decide(Decision::shipped(), accepted, &rounds, &findings);
+        decide(Decision::shipped(), settings.temperature, accepted, &rounds, &findings);
     let choosing = HeldOut::new(&search.kept, [&null, &accepted]);
     let reported = search.reported.as_ref().map(|study| HeldOut::new(study, [&null, &accepted]));
     let reported = reported.unwrap_or_else(|| choosing.clone());
