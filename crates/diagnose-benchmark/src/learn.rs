@@ -91,8 +91,6 @@ impl Truth {
 /// What of an answer is read.
 #[derive(Clone, Debug, Deserialize)]
 struct Answer {
-    probabilities: Probabilities,
-    verdict: String,
     findings: Vec<Findings>,
     effects: Vec<Answered>,
     rollouts: u64,
@@ -120,8 +118,6 @@ pub struct Example {
     pub truth: Truth,
     /// What speaks for the best effect of the search.
     pub findings: Findings,
-    /// What was answered, by the decision that the program had.
-    pub answered: Probabilities,
     /// Whether the 90 % interval of each parameter of a rightly named effect holds its value.
     pub covered: Vec<bool>,
     /// Simulated episodes.
@@ -223,14 +219,7 @@ fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
             named.parameters.iter().filter_map(holds).collect::<Vec<_>>()
         })
         .collect();
-    let answered = match answer.verdict.as_str() {
-        // An effect may be named by its evidence where the decision is not asked.
-        "effect" => {
-            Probabilities { effect: answer.probabilities.effect.max(0.5 + f64::EPSILON), ..answer.probabilities }
-        }
-        _ => answer.probabilities,
-    };
-    Some(Example { log, truth, findings, answered, covered, rollouts: answer.rollouts, seconds: answer.seconds })
+    Some(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds })
 }
 
 /// The regression that examples teach. How far weights may go is what predicts best the engines among them that are left out, each in turn.
@@ -403,8 +392,7 @@ mod tests {
             size: 1.0,
             episodes: [20, 4],
         };
-        let answered = Probabilities { effect: 0.2, none: 0.6, unknown: 0.2 };
-        Example { log: "log".into(), truth, findings, answered, covered: vec![true], rollouts: 100, seconds: 1.0 }
+        Example { log: "log".into(), truth, findings, covered: vec![true], rollouts: 100, seconds: 1.0 }
     }
 
     #[test]

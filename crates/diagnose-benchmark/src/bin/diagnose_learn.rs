@@ -29,7 +29,7 @@ struct Arguments {
     /// Folder for the table of each engine, left out of what judges it.
     #[arg(long)]
     table: Option<PathBuf>,
-    /// Judges the answers as they are, by diagnose with this decision, which was made from other logs.
+    /// Judges by this decision, which was made from other logs, instead of learning one: unseen logs.
     #[arg(long, conflicts_with = "out")]
     unseen: Option<PathBuf>,
 }
@@ -95,7 +95,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Every example with the probabilities that it was answered with, by a decision that was made from other logs.
+/// Every example with the probabilities of a decision that was made from other logs.
 fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<(&'a Example, Probabilities)>> {
     let decision: Decision = diagnose_benchmark::folder::read(path)?;
     let seen = |example: &Example| {
@@ -110,7 +110,7 @@ fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<(&'
             path.display()
         );
     }
-    Ok(examples.iter().map(|example| (example, example.answered)).collect())
+    Ok(examples.iter().map(|example| (example, decision.probabilities(&example.findings))).collect())
 }
 
 fn write(path: &std::path::Path, text: &str) -> Result<()> {
