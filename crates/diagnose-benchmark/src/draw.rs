@@ -30,7 +30,7 @@ use crate::generate::{Actions, FRICTION, MASS_KG};
 #[must_use]
 pub fn identifiable(kind: EffectKind, actions: Actions) -> bool {
     use EffectKind as K;
-    kind != K::EdgeRounding
+    !matches!(kind, K::EdgeRounding | K::ContactCompliance)
         && (actions == Actions::Designed || !matches!(kind, K::ForceGain | K::ForceDrift | K::StaticFriction))
 }
 

@@ -397,10 +397,10 @@ pub(crate) mod tests {
         let thrown = Context { tool: false, ..context() };
         let [pushed, thrown] = [context(), thrown].map(|context| candidates(&context));
         for kind in EffectKind::ALL {
-            let expected = !matches!(kind, K::RollingResistance | K::EdgeRounding);
+            let expected = !matches!(kind, K::RollingResistance | K::EdgeRounding | K::ContactCompliance);
             assert_eq!(pushed.iter().any(|c| c.kind() == *kind), expected, "{}", kind.name());
             let tools = matches!(kind, K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion);
-            let expected = !tools && !matches!(kind, K::RollingResistance | K::HiddenObstacle);
+            let expected = !tools && !matches!(kind, K::RollingResistance | K::HiddenObstacle | K::ContactCompliance);
             assert_eq!(thrown.iter().any(|c| c.kind() == *kind), expected, "{}, thrown", kind.name());
         }
         for candidate in pushed.iter().chain(&thrown) {

@@ -39,13 +39,17 @@ const CONTACT_LAWS: [&str; 7] = [
     "adhesion",
 ];
 
+/// No evidence and no error is larger to a decision.
+const MOST: f64 = 1e6;
+
 /// What the feature vector of findings is, in the order of [`FEATURES`].
 #[must_use]
 pub fn features(findings: &Findings) -> [f64; FEATURES.len()] {
-    // Numbers that say no more beyond a point are held there.
-    let logarithm = |value: f64, least: f64| value.max(least).ln();
-    let gain = |value: f64| value.max(0.0).ln_1p();
-    let bounded = |value: f64, most: f64| value.clamp(-most, most);
+    // Numbers that say no more beyond a point are held there; what is no number is as far out as can be.
+    let held = |value: f64, least: f64, most: f64| if value.is_nan() { most } else { value.clamp(least, most) };
+    let logarithm = |value: f64, least: f64| held(value, least, MOST).ln();
+    let gain = |value: f64| held(value, 0.0, MOST).ln_1p();
+    let bounded = |value: f64, most: f64| held(value, -most, most);
     [
         gain(findings.log_evidence),
         gain(findings.margin),

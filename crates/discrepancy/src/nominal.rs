@@ -325,6 +325,12 @@ impl Nominal {
         }
     }
 
+    /// Coordinates with contacts as the model has them.
+    pub(crate) fn with_own_contacts(&self, z: &[f64]) -> Vec<f64> {
+        let contact = |place: Place| matches!(place, Place::ContactFrequency | Place::ContactDamping);
+        (self.tunables.iter().zip(z)).map(|(tunable, z)| if contact(tunable.place) { 0.0 } else { *z }).collect()
+    }
+
     /// A tunable's value in its prior mean; 1 where re-tuning may not change it.
     fn factor(&self, z: &[f64], place: Place) -> f64 {
         let index = self.tunables.iter().position(|tunable| tunable.place == place);

@@ -142,7 +142,9 @@ impl<'a> Simulator<'a> {
         let configs = || self.nominal.effects.iter().chain(&hypothesis.effects);
         let bounces = configs().any(|effect| effect.kind() == EffectKind::Restitution) && self.nominal.has_tool();
         let engine = &Engine { refinement: engine.refinement * if bounces { BOUNCE_REFINEMENT } else { 1 }, ..*engine };
-        let rig = self.nominal.rig(&hypothesis.z, engine);
+        // A contact that damps less bounces as well: beside a restitution contacts are the model's.
+        let own = bounces.then(|| self.nominal.with_own_contacts(&hypothesis.z));
+        let rig = self.nominal.rig(own.as_deref().unwrap_or(&hypothesis.z), engine);
         let object = self.nominal.object(&hypothesis.z, trial.added_mass_kg, engine);
         let effects: Vec<Box<dyn Effect>> = configs().map(EffectConfig::build).collect();
         let body = nudged(&trial.start, &trial.start_stddev, nudge);
