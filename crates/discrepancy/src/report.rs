@@ -185,7 +185,8 @@ impl Report {
         let ([low, high], nominal) = (value.interval90, value.prior[0]);
         let ratio = value.value / nominal;
         let than = if ratio > 1.0 { "stiffer" } else { "softer" };
-        (ratio.ln().abs() > FACTOR.ln() && (low > nominal || high < nominal)).then(|| {
+        let clear = ratio.ln().abs() > FACTOR.ln() && (low > nominal || high < nominal);
+        (clear && [ratio, low, high].iter().all(|value| value.is_finite())).then(|| {
             format!(
                 "Contacts are {than} than the model's: their natural frequency is {:.0} Hz instead of {nominal:.0} (90 %: {low:.0} to {high:.0} Hz); \
                  re-tuned, no effect.",
@@ -200,7 +201,7 @@ impl Report {
         let far = |value: &Retuned| {
             let [mean, stddev] = value.prior;
             let by = (value.value - mean).abs() / stddev;
-            (by > FAR).then(|| {
+            (by > FAR && by.is_finite() && mean.is_finite()).then(|| {
                 format!(
                     "Re-tuning has moved {} to {:.3}, {by:.0} standard deviations from the {mean:.3} of log.toml: check it.",
                     value.key, value.value

@@ -22,7 +22,7 @@ pub(super) fn what(report: &Report, words: &Words) -> Markup {
             @if report.verdict == Verdict::Unknown {
                 "No effect of the catalogue explains the gap. Where it acts is said under " a href="#remains" { "what remains" } "."
             } @else {
-                "No " (words.mark("effect")) " is needed: the " (words.mark("re-tuned")) " nominal model explains the log as well as its noise allows."
+                "No " (words.mark("effect")) " is needed: the " (words.mark("re-tuned")) " nominal model explains the log as well as its noise, and contacts of its own, allow."
             }
         }
     }
