@@ -52,6 +52,11 @@ def compared(with_it, without, stamps, effects, rig):
     return total / max(count, 1)
 
 
+def four_digits(value):
+    """None where the engine went astray: JSON has no NaN."""
+    return float(f"{value:.4g}") if math.isfinite(value) else None
+
+
 def draw_effects(rng, scene, rig, kind, strength, unsupported):
     """Names and parameters; the scene changes where an effect says what its true value is."""
     table = hidden.OUTSIDE if kind == "outside" else hidden.DRAWS
@@ -171,12 +176,12 @@ def truth_of(seed, index, engine, variant, scene, rig, kind, effects, plan, seen
     catalogue = kind in ("one", "pair")
     friction = effects["friction_level"]["coefficient"] if "friction_level" in effects else scene.friction
     listed = [{"name": n, "parameters": p} | ({"in_range": hidden.in_range(n, p)} if catalogue else {})
-              | ({"detectable": float(f"{each[n]:.4g}")} if n in each else {}) for n, p in effects.items()]
+              | ({"detectable": four_digits(each[n])} if n in each else {}) for n, p in effects.items()]
     return {
         "name": f"log-{index:03d}", "seed": seed, "engine": engine, "variant": variant, "engine_version": engines.version(engine),
         "natural": list(engines.NATURAL.get((engine, variant), ())), "kind": kind,
         "effects": listed if catalogue else [], "outside": listed if kind == "outside" else [],
-        "detectable": float(f"{seen:.4g}"), "designed": rig.designed and not rig.tosses, "tosses": rig.tosses,
+        "detectable": four_digits(seen), "designed": rig.designed and not rig.tosses, "tosses": rig.tosses,
         "sensors": sorted(rig.sensors), "period_s": rig.period_s, "straight": rig.straight,
         "jitter": round(rig.jitter, 4), "dropped": round(rig.dropped, 4),
         "lost_poses": round(rig.lost_poses, 4), "own_rows": rig.own_rows, "force_mean": rig.force_mean, "skew_s": rig.skew_s,
