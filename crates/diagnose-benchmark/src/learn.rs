@@ -7,22 +7,29 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context as _, Result};
-use discrepancy::decision::{Decision, FEATURES, Probabilities, features};
+use discrepancy::decision::{
+    Decision, EFFECT_FEATURES, LOG_FEATURES, Probabilities, Scale, Score, effect_features, log_features, standardised,
+};
 use discrepancy::findings::Findings;
+use nalgebra::DVector;
 use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
 
+use crate::choice::{self, Choice};
 use crate::folder::{Identity, name};
 use crate::generate::Actions;
-use crate::logistic;
 use crate::plan::{self, Plan};
 
 /// Prior variances of a weight of a standardised feature, of which the one is taken that predicts engines best that were left out.
 const VARIANCES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
+/// That of an offset: hardly any prior.
+const OFFSET: f64 = 100.0;
 /// A mean square difference, in those of noise, by which an effect changes its episodes, below which nothing shows.
 const DETECTABLE: f64 = 3.0;
-/// What is re-tuned like a mass is no effect that a diagnosis names.
-const RE_TUNED: &str = "contact_compliance";
+/// Episodes of a log of our own benchmark, about.
+const OWN_EPISODES: usize = 40;
+/// A camera's delay, s, up to which it is a skew of its clock.
+const SKEW_SECS: f64 = 0.05;
 
 /// What a log hides.
 #[derive(Clone, Debug, Deserialize)]
@@ -44,6 +51,8 @@ pub struct Truth {
     pub natural: Vec<String>,
     /// Whether its actions were chosen to tell effects apart.
     pub designed: bool,
+    /// Number of its episodes.
+    pub episodes: usize,
 }
 
 /// A hidden effect.
@@ -54,6 +63,18 @@ pub struct Named {
     /// Values by the keys of its parameters.
     #[serde(default)]
     pub parameters: BTreeMap<String, serde_json::Value>,
+}
+
+impl Named {
+    /// Whether it is re-tuned like a mass, and no diagnosis names it.
+    fn is_re_tuned(&self) -> bool {
+        let delay_secs = || self.parameters.get("delay_secs").and_then(serde_json::Value::as_f64);
+        match self.name.as_str() {
+            "contact_compliance" => true,
+            "pose_delay" => delay_secs().is_some_and(|secs| secs <= SKEW_SECS),
+            _ => false,
+        }
+    }
 }
 
 /// What a right answer is.
@@ -73,8 +94,7 @@ impl Truth {
     #[must_use]
     pub fn kind(&self) -> Kind {
         let shows = self.detectable.is_some_and(|size| size >= DETECTABLE);
-        let named = |effect: &Named| effect.name != RE_TUNED;
-        match (!self.effects.iter().any(named), self.outside.is_empty()) {
+        match (self.effects.iter().all(Named::is_re_tuned), self.outside.is_empty()) {
             (_, false) if shows => Kind::Outside,
             (false, true) if shows => Kind::Effect,
             _ => Kind::None,
@@ -91,7 +111,7 @@ impl Truth {
 /// What of an answer is read.
 #[derive(Clone, Debug, Deserialize)]
 struct Answer {
-    findings: Vec<Findings>,
+    findings: Vec<Vec<Findings>>,
     effects: Vec<Answered>,
     rollouts: u64,
     seconds: f64,
@@ -106,7 +126,8 @@ struct Answered {
 #[derive(Clone, Debug, Deserialize)]
 struct Value {
     key: String,
-    interval90: [f64; 2],
+    /// JSON has no infinity: an end that is none is one.
+    interval90: [Option<f64>; 2],
 }
 
 /// A log with its answer.
@@ -116,8 +137,8 @@ pub struct Example {
     pub log: String,
     /// What it hides.
     pub truth: Truth,
-    /// What speaks for the best effect of the search.
-    pub findings: Findings,
+    /// What speaks for each effect that was compared, but for those that the engine has by nature.
+    pub findings: Vec<Findings>,
     /// Whether the 90 % interval of each parameter of a rightly named effect holds its value.
     pub covered: Vec<bool>,
     /// Simulated episodes.
@@ -127,17 +148,31 @@ pub struct Example {
 }
 
 impl Example {
-    /// The class that it teaches: 0, the best effect is right; 1, nothing is missing; 2, something else is.
-    fn label(&self) -> usize {
+    /// The alternative that it teaches: the place of the effect that is right among those that were compared; then nothing, then something else.
+    pub(crate) fn label(&self) -> usize {
+        let compared = self.findings.len();
         match self.truth.kind() {
-            Kind::Effect if self.truth.names(&self.findings.effect) => 0,
-            Kind::None => 1,
-            Kind::Effect | Kind::Outside => 2,
+            Kind::None => compared,
+            Kind::Outside => compared + 1,
+            Kind::Effect => {
+                let right = self.findings.iter().position(|found| self.truth.names(&found.effect));
+                right.unwrap_or(compared + 1)
+            }
+        }
+    }
+
+    /// The probability of what it teaches.
+    pub(crate) fn of_label(&self, found: &Probabilities) -> f64 {
+        let label = self.label();
+        match self.findings.get(label) {
+            Some(right) => found.of(&right.effect),
+            None if label == self.findings.len() => found.none,
+            None => found.unknown,
         }
     }
 }
 
-/// Reads the logs of `folder` that have an answer in `answers`, but for those whose best effect is one that the engine has by nature.
+/// Reads the logs of `folder` that have an answer in `answers`.
 ///
 /// # Errors
 ///
@@ -193,27 +228,30 @@ fn read_own(folder: &Path) -> Result<Vec<Example>> {
             detectable: Some(f64::INFINITY),
             natural: Vec::new(),
             designed: own.spec.actions == Actions::Designed,
+            episodes: OWN_EPISODES,
         };
         examples.extend(example(format!("rapier/{}", name(set)), truth, crate::folder::read(&report)?));
     }
     Ok(examples)
 }
 
-/// Nothing of an answer whose best effect is one that the engine has by nature, or of a log whose engine could not say what is hidden changes.
+/// Nothing of a log whose engine could not say what is hidden changes.
 fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
     let hides = !truth.effects.is_empty() || !truth.outside.is_empty();
     if hides && truth.detectable.is_none() {
         return None;
     }
-    let findings = answer.findings.into_iter().next()?;
-    if truth.natural.contains(&findings.effect) && !truth.names(&findings.effect) {
-        return None;
-    }
+    let mut findings = answer.findings.into_iter().next()?;
+    findings.retain(|found| {
+        let natural = truth.natural.contains(&found.effect) && !truth.names(&found.effect);
+        !found.effect.is_empty() && !natural
+    });
     let covered = (answer.effects.iter())
         .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
         .flat_map(|(named, effect)| {
             let holds = |value: &Value| {
                 let [low, high] = value.interval90;
+                let (low, high) = (low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY));
                 effect.parameters.get(&value.key)?.as_f64().map(|truth| (low..=high).contains(&truth))
             };
             named.parameters.iter().filter_map(holds).collect::<Vec<_>>()
@@ -222,7 +260,7 @@ fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
     Some(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds })
 }
 
-/// The regression that examples teach. How far weights may go is what predicts best the engines among them that are left out, each in turn.
+/// The decision that examples teach. How far weights may go is what predicts best the engines among them that are left out, each in turn.
 #[must_use]
 pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
     let loss = |variance: f64| -> f64 {
@@ -230,7 +268,7 @@ pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
             let (own, others): (Vec<&Example>, Vec<&Example>) =
                 examples.iter().copied().partition(|example| example.truth.engine == **engine);
             let decision = regress(&others, variance, serde_json::Value::Null);
-            own.iter().map(|example| -of_label(&decision.probabilities(&example.findings), example).ln()).sum()
+            own.iter().map(|example| -example.of_label(&decision.probabilities(&example.findings)).ln()).sum()
         };
         engines(examples).iter().map(left_out).sum()
     };
@@ -246,29 +284,62 @@ fn engines<'a>(examples: &[&'a Example]) -> Vec<&'a str> {
     engines
 }
 
-/// The probability of what an example teaches.
-fn of_label(found: &Probabilities, example: &Example) -> f64 {
-    [found.effect, found.none, found.unknown][example.label()]
+/// Largest ln evidence of what was compared.
+fn most(findings: &[Findings]) -> f64 {
+    findings.iter().map(|found| found.log_evidence).fold(f64::NEG_INFINITY, f64::max)
 }
 
-fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) -> Decision {
-    let rows: Vec<[f64; FEATURES.len()]> = examples.iter().map(|example| features(&example.findings)).collect();
+fn scales(names: &[&str], rows: &[Vec<f64>]) -> Vec<Scale> {
     let n = rows.len().max(1) as f64;
     let scale = |index: usize| {
         let mean = rows.iter().map(|row| row[index]).sum::<f64>() / n;
         let variance = rows.iter().map(|row| (row[index] - mean).powi(2)).sum::<f64>() / n;
         // What all examples have in common says nothing.
-        (FEATURES[index].to_string(), mean, variance.sqrt().max(1e-6))
+        (names[index].to_string(), mean, variance.sqrt().max(1e-6))
     };
-    let scales: Vec<(String, f64, f64)> = (0..FEATURES.len()).map(scale).collect();
-    let standard = |row: &[f64; FEATURES.len()]| -> Vec<f64> {
-        row.iter().zip(&scales).map(|(value, (_, mean, stddev))| (value - mean) / stddev).collect()
+    (0..names.len()).map(scale).collect()
+}
+
+fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) -> Decision {
+    let of_effects = |example: &&Example| -> Vec<Vec<f64>> {
+        let most = most(&example.findings);
+        example.findings.iter().map(|found| effect_features(found, most).to_vec()).collect()
     };
-    let standard: Vec<Vec<f64>> = rows.iter().map(standard).collect();
-    let labels: Vec<usize> = examples.iter().map(|example| example.label()).collect();
-    let mut classes = logistic::fit(&standard, &labels, 3, variance).into_iter();
-    let mut next = || classes.next().unwrap_or_default();
-    Decision { provenance, features: scales, classes: [next(), next(), next()] }
+    let effects: Vec<Vec<Vec<f64>>> = examples.iter().map(of_effects).collect();
+    let logs: Vec<Vec<f64>> = examples.iter().map(|example| log_features(&example.findings).to_vec()).collect();
+    let of_effects = scales(&EFFECT_FEATURES, &effects.concat());
+    let of_logs = scales(&LOG_FEATURES, &logs);
+    // Offset and weights of the score of an effect, of nothing and of something else, one after another.
+    let sizes = [EFFECT_FEATURES.len(), LOG_FEATURES.len(), LOG_FEATURES.len()].map(|count| 1 + count);
+    let firsts = [0, sizes[0], sizes[0] + sizes[1]];
+    let alternative = |class: usize, standard: Vec<f64>| {
+        let mut x = DVector::zeros(sizes.iter().sum());
+        x[firsts[class]] = 1.0;
+        x.rows_mut(firsts[class] + 1, standard.len()).copy_from_slice(&standard);
+        x
+    };
+    let choice = |((example, effects), log): ((&&Example, &Vec<Vec<f64>>), &Vec<f64>)| {
+        let effects = effects.iter().map(|row| alternative(0, standardised(row, &of_effects).collect()));
+        let log: Vec<f64> = standardised(log, &of_logs).collect();
+        let alternatives = effects.chain([alternative(1, log.clone()), alternative(2, log)]).collect();
+        Choice { alternatives, chosen: example.label() }
+    };
+    let choices: Vec<Choice> = examples.iter().zip(&effects).zip(&logs).map(choice).collect();
+    let variances: Vec<f64> =
+        (0..sizes.iter().sum()).map(|place| if firsts.contains(&place) { OFFSET } else { variance }).collect();
+    let theta = choice::fit(&choices, &variances);
+    let score = |class: usize| Score {
+        offset: theta[firsts[class]],
+        weights: theta.rows(firsts[class] + 1, sizes[class] - 1).iter().copied().collect(),
+    };
+    Decision {
+        provenance,
+        effect: score(0),
+        none: score(1),
+        unknown: score(2),
+        effect_features: of_effects,
+        log_features: of_logs,
+    }
 }
 
 /// Every example with the probabilities of what the other engines teach.
@@ -283,85 +354,10 @@ pub fn leave_one_engine_out(examples: &[Example]) -> Vec<(&Example, Probabilitie
     engines(&examples.iter().collect::<Vec<_>>()).into_iter().flat_map(judged).collect()
 }
 
-/// Counts of what is judged.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Judged {
-    /// Logs with an effect of the catalogue that shows, and how many of them it is named in.
-    pub effects: [u32; 2],
-    /// The same by the name alone, whatever the verdict.
-    pub first: u32,
-    /// Logs without one, and how many are called `none`.
-    pub none: [u32; 2],
-    /// Of these how many are called `effect`.
-    pub false_alarms: u32,
-    /// Logs with something outside the catalogue, and how many are called `unknown`.
-    pub outside: [u32; 2],
-    /// Wrong names with a confidence of 0.9 and more, of all logs.
-    pub sure_and_wrong: u32,
-    /// Logs.
-    pub logs: u32,
-    /// Parameters of what was named rightly, and how many 90 % intervals hold the truth.
-    pub intervals: [u32; 2],
-    /// Expected calibration error of the probability that the best effect is right, ten bins.
-    pub calibration_error: f64,
-    /// Of each tenth of that probability: mean, share that was right, number.
-    pub reliability: Vec<(f64, f64, u32)>,
-    /// Mean −ln probability of the right class.
-    pub log_loss: f64,
-    /// Means over the logs.
-    pub rollouts: f64,
-    /// Durations, s.
-    pub seconds: f64,
-}
-
-/// Counts over judged examples.
-#[must_use]
-pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
-    use discrepancy::Verdict;
-    let mut counts = Judged { logs: judged.len() as u32, ..Judged::default() };
-    let mut bins = [(0.0, 0_u32, 0_u32); 10];
-    for (example, found) in judged {
-        let (verdict, label) = (found.verdict(), example.label());
-        let right = example.truth.names(&example.findings.effect);
-        match example.truth.kind() {
-            Kind::Effect => {
-                counts.effects[0] += 1;
-                counts.first += u32::from(right);
-                counts.effects[1] += u32::from(right && verdict == Verdict::Effect);
-            }
-            Kind::None => {
-                counts.none[0] += 1;
-                counts.none[1] += u32::from(verdict == Verdict::None);
-                counts.false_alarms += u32::from(verdict == Verdict::Effect);
-            }
-            Kind::Outside => {
-                counts.outside[0] += 1;
-                counts.outside[1] += u32::from(verdict == Verdict::Unknown);
-            }
-        }
-        counts.sure_and_wrong += u32::from(found.effect >= 0.9 && label != 0);
-        let bin = &mut bins[((found.effect * 10.0) as usize).min(9)];
-        *bin = (bin.0 + found.effect, bin.1 + u32::from(label == 0), bin.2 + 1);
-        if right {
-            counts.intervals[0] += example.covered.len() as u32;
-            counts.intervals[1] += example.covered.iter().filter(|covered| **covered).count() as u32;
-        }
-        counts.log_loss -= of_label(found, example).ln() / judged.len() as f64;
-        counts.rollouts += example.rollouts as f64 / judged.len() as f64;
-        counts.seconds += example.seconds / judged.len() as f64;
-    }
-    for (sum, right, count) in bins.into_iter().filter(|(_, _, count)| *count > 0) {
-        let n = f64::from(count);
-        let (mean, share) = (sum / n, f64::from(right) / n);
-        counts.calibration_error += n / f64::from(counts.logs) * (mean - share).abs();
-        counts.reliability.push((mean, share, count));
-    }
-    counts
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::judge::judge;
 
     fn example(engine: &str, effect: bool, found: &str, log_evidence: f64) -> Example {
         let effects =
@@ -375,11 +371,14 @@ mod tests {
             detectable: Some(if effect { 10.0 } else { 0.0 }),
             natural: Vec::new(),
             designed: true,
+            episodes: 30,
         };
-        let findings = Findings {
+        let findings = vec![Findings {
             effect: found.into(),
             log_evidence,
             margin: log_evidence,
+            whole: true,
+            coordinates: 2,
             steadiness: 1.0,
             heldout_steadiness: 1.0,
             drop: 0.0,
@@ -391,7 +390,7 @@ mod tests {
             force_share: [0.0; 2],
             size: 1.0,
             episodes: [20, 4],
-        };
+        }];
         Example { log: "log".into(), truth, findings, covered: vec![true], rollouts: 100, seconds: 1.0 }
     }
 
@@ -422,10 +421,16 @@ mod tests {
         assert_eq!(hidden.kind(), Kind::None);
         hidden = Truth {
             detectable: Some(50.0),
-            effects: vec![Named { name: RE_TUNED.into(), parameters: BTreeMap::new() }],
+            effects: vec![Named { name: "contact_compliance".into(), parameters: BTreeMap::new() }],
             ..hidden
         };
         assert_eq!(hidden.kind(), Kind::None);
+        for (secs, kind) in [(0.03, Kind::None), (0.08, Kind::Effect)] {
+            let parameters = [("delay_secs".to_string(), serde_json::Value::from(secs))].into();
+            hidden.effects = vec![Named { name: "pose_delay".into(), parameters }];
+            assert_eq!(hidden.kind(), kind);
+        }
+        hidden.effects.clear();
         hidden.outside.push(serde_json::Value::from("magnet"));
         assert_eq!(hidden.kind(), Kind::Outside);
     }

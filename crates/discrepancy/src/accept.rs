@@ -77,7 +77,7 @@ pub(crate) fn better_heldout(found: &Heldout, other: &Heldout) -> bool {
 /// resamples, as wide as the intervals that are reported; and it is no error of the engine.
 pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
     let Some(mut samples) = bootstrap(fit, groups, seed) else { return false };
-    widen(&mut samples, fit);
+    widen(&mut samples, fit, 0.0);
     let mut first = fit.model.tunables + fit.model.errors;
     !fit.model.parts.is_empty()
         && fit.model.parts.iter().all(|part| {

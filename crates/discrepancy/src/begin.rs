@@ -42,8 +42,10 @@ pub(crate) fn shake(part: &Study, best: &mut Fit) {
 }
 
 /// Pairs of effects that do nearly the same: what one does at some strength, the other does at another.
-const TWINS: [[EffectKind; 2]; 7] = [
+const TWINS: [[EffectKind; 2]; 9] = [
     [EffectKind::TableTilt, EffectKind::ConstantForce],
+    [EffectKind::Tether, EffectKind::TableTilt],
+    [EffectKind::Tether, EffectKind::ConstantForce],
     [EffectKind::ViscousDamping, EffectKind::QuadraticDrag],
     [EffectKind::ForceBias, EffectKind::WristPayload],
     [EffectKind::PoseScale, EffectKind::TimeBase],
@@ -52,13 +54,14 @@ const TWINS: [[EffectKind; 2]; 7] = [
     [EffectKind::FrictionLevel, EffectKind::ForceGain],
 ];
 
-/// Fits `other` anew from where its last effect does what that of `best` does, if that is better than where it is.
-pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
-    let (Some(found), Some(candidate)) = (best.model.parts.last(), other.model.parts.last()) else { return };
-    let kinds = [found.kind(), candidate.kind()];
-    if !TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]]) {
-        return;
-    }
+/// Whether two kinds of effects do nearly the same.
+pub(crate) fn are_twins(kinds: [EffectKind; 2]) -> bool {
+    TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]])
+}
+
+/// −ln posterior where the last effect of `model` does what that of `best` does, its twin, and a fit can begin.
+pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Begin)> {
+    let (found, candidate) = (best.model.parts.last()?, model.parts.last()?);
     let (shared, own) = best.x.split_at(best.x.len() - found.coordinates.len());
     let z = &shared[..best.model.tunables];
     let begin = match (found.effect(own), candidate.kind()) {
@@ -71,26 +74,25 @@ pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
             let weight_n = weight_n(part, z);
             candidate.coordinates_of(&[tilt.slope_x_rad * weight_n, tilt.slope_y_rad * weight_n])
         }
-        _ => match translate(part, z, (found, own), candidate) {
-            Some(begin) => begin,
-            None => return,
-        },
+        // What the spring pulls with where objects begin.
+        (EffectConfig::Tether(tether), EffectKind::ConstantForce | EffectKind::TableTilt) => {
+            let starts = part.chosen.iter().map(|index| part.simulator.trials[*index].start.position_m);
+            let n = part.chosen.len().max(1) as f64;
+            let [x, y] = starts.fold([0.0; 2], |[x, y], start| [x + start[0] / n, y + start[1] / n]);
+            let pull = [x - tether.anchor_x_m, y - tether.anchor_y_m].map(|off| -tether.stiffness_npm * off);
+            let weight_n = if candidate.kind() == EffectKind::TableTilt { weight_n(part, z) } else { 1.0 };
+            candidate.coordinates_of(&pull.map(|force_n| force_n / weight_n))
+        }
+        _ => translate(part, z, (found, own), candidate)?,
     };
     let at = |share: f64| {
         let own = begin.iter().zip(&candidate.coordinates).map(|(a, c)| (share * a).clamp(c.range[0], c.range[1]));
         let x: Vec<f64> = shared.iter().copied().chain(own).collect();
-        let raw = part.raw(&other.model.hypothesis(&x));
-        let cost = cost(&x, &part.white(&raw, other.model.engine_errors(&x)));
+        let raw = part.raw(&model.hypothesis(&x));
+        let cost = cost(&x, &part.white(&raw, model.engine_errors(&x)));
         (cost, Begin { x, raw: Some(raw), jacobian: Vec::new() })
     };
-    let begins = [1.0, 1.5, 2.25].map(at);
-    let Some((cost, begin)) = begins.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
-    if cost < other.cost() {
-        let again = fit(part, other.model.clone(), begin, Effort::Quick);
-        if again.log_evidence() > other.log_evidence() {
-            *other = again;
-        }
-    }
+    [1.0, 1.5, 2.25].map(at).into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// Weight of the object, N.
@@ -162,6 +164,17 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     };
     let good = |place: &Place| before - place.cost > 0.5 * promised;
     let mut tried: Vec<Place> = Vec::new();
+    // Without the effect nothing is lost: a fit goes from there as far as it finds.
+    let changes_nothing = promise.candidate.kind() != EffectKind::Restitution
+        && part.simulator.nominal.replaced_by(promise.candidate.kind()).next().is_none();
+    if promise.candidate.begin.is_none() && changes_nothing {
+        tried.push(Place { cost: before, x: at(0.0), raw: base.raw.clone() });
+    }
+    if let Some(start) = &promise.start {
+        let mut x = [base.x.as_slice(), &start.own].concat();
+        x[..start.clocks.len()].copy_from_slice(&start.clocks);
+        tried.push(simulated(x));
+    }
     // From a border, where a strength may have no more effect, a fit does not find back.
     let at_border = (promise.begin.iter().zip(&promise.candidate.coordinates))
         .any(|(a, coordinate)| coordinate.strength && *a != 0.0 && coordinate.range.contains(a));
@@ -182,7 +195,9 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
         tried.extend([whole, 0.4 * whole].map(|share| simulated(together(share))));
     }
     let clips = promise.candidate.kind() == EffectKind::ForceSaturation;
-    if clips || !tried.iter().any(good) {
+    // Every bounce more or less is a ridge, whatever a scan promises of one.
+    let bounces = promise.candidate.kind() == EffectKind::Restitution;
+    if clips || bounces || !tried.iter().any(good) {
         for own in promise.candidate.elsewhere() {
             tried.push(simulated(base.x.iter().chain(&own).copied().collect()));
             // What re-tuning moved far to do what a sensor does is back where it was without it.

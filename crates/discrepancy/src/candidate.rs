@@ -15,10 +15,6 @@ use coordinate::coordinates;
 
 /// Of the distance from the neutral to the farthest plausible value: one standard deviation of the prior of a strength.
 const STRENGTH_SHARE: f64 = 1.0 / 1.5;
-/// How far from neutral, in units, a linear step is measured: far enough to stand out of the solver's grain.
-const REACH: f64 = 0.35;
-/// The same where what a strength does is far from linear.
-const FAR: f64 = 1.2;
 /// A coefficient of restitution, where the model has none, below which contacts of another engine part as fast. Of 20 logs of arms (seed 30 of the benchmark) one
 /// without an effect was told 0.05.
 const LEAST_BOUNCE: f64 = 0.1;
@@ -91,8 +87,6 @@ pub struct Candidate {
     pub coordinates: Vec<Coordinate>,
     /// Coordinates that a fit starts from for what has no small version of itself (a body in the way); `None`: from 0.
     pub begin: Option<Vec<f64>>,
-    /// How far from neutral, in units, the screening measures what a strength does; the other way where this is beyond the range.
-    pub reach: f64,
 }
 
 impl Candidate {
@@ -146,9 +140,7 @@ impl Candidate {
     pub fn elsewhere(&self) -> Vec<Vec<f64>> {
         match self.kind() {
             // Every bounce more or less is a ridge; for the kind the stronger step alone asks.
-            EffectKind::Restitution if self.reach == FAR => {
-                BOUNCES.iter().map(|e| self.coordinates_of(&[*e])).collect()
-            }
+            EffectKind::Restitution => BOUNCES.iter().map(|e| self.coordinates_of(&[*e])).collect(),
             // What a round object, which slips off its tool, does is no multiple of what a slight anisotropy does, and every axis has its own valley.
             EffectKind::AnisotropicFriction => {
                 let axes = |a| (0..8).map(move |eighth| [a, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
@@ -220,7 +212,7 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
             values[*index] = *value;
         }
         let base = neutral.with_parameters(&values).unwrap_or_else(|_| neutral.clone());
-        Candidate { coordinates: coordinates(&base, context), base, begin: None, reach: REACH }
+        Candidate { coordinates: coordinates(&base, context), base, begin: None }
     };
     match kind {
         // Both harmonics of the direction, either sign: the amplitude has none.
@@ -243,14 +235,6 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         }
         EffectKind::StribeckFriction => [0.02, 0.06].iter().map(|v| with(&[(1, *v)])).collect(),
         EffectKind::HiddenObstacle => obstacles(context),
-        // What a bounce changes is no multiple of what a slight one does.
-        EffectKind::Restitution | EffectKind::Adhesion => {
-            [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
-        }
-        // A few degrees or hundredths are millimetres to centimetres, pushes go another way, and a slight one says nothing of that.
-        EffectKind::PoseRotation | EffectKind::PoseScale => {
-            [REACH, FAR, -FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
-        }
         _ => vec![with(&[])],
     }
 }
@@ -284,7 +268,7 @@ fn obstacles(context: &Context) -> Vec<Candidate> {
             coordinates.push(unit(6, 0.6, [-1.5, 6.0]));
         }
         let begin = Some(vec![0.0; coordinates.len()]);
-        Candidate { base, coordinates, begin, reach: REACH }
+        Candidate { base, coordinates, begin }
     };
     context.obstacles_m.iter().flat_map(bodies).map(candidate).collect()
 }
@@ -350,25 +334,8 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn bounces_are_looked_for_where_they_are_slight_and_where_they_are_strong() {
+    fn bounces_are_tried_once() {
         let all = candidates(&context());
-        let of = |kind| all.iter().filter(move |candidate| candidate.kind() == kind);
-        let at_reach = |candidate: &Candidate| {
-            let a: Vec<f64> =
-                candidate.coordinates.iter().map(|c| if c.strength { candidate.reach } else { 0.0 }).collect();
-            candidate.effect(&a).values()[0]
-        };
-        let [little, much] = of(EffectKind::Restitution).map(at_reach).collect::<Vec<_>>()[..] else { panic!() };
-        assert!(little > 0.1 && little < 0.3 && much > 0.5 && much < 0.9, "{little} and {much}");
-    }
-
-    #[test]
-    fn frames_are_looked_at_from_far_and_bounces_are_tried_once() {
-        let all = candidates(&context());
-        for kind in [EffectKind::PoseRotation, EffectKind::PoseScale] {
-            let reaches: Vec<f64> = all.iter().filter(|c| c.kind() == kind).map(|c| c.reach).collect();
-            assert_eq!(reaches, [REACH, FAR, -FAR]);
-        }
         let bounces: Vec<_> = all.iter().filter(|c| c.kind() == EffectKind::Restitution).collect();
         let tried: Vec<_> = bounces.iter().flat_map(|c| c.elsewhere().into_iter().map(|a| c.effect(&a))).collect();
         let coefficients: Vec<f64> = tried.iter().map(|effect| effect.values()[0]).collect();

@@ -1,18 +1,19 @@
-//! Which residuals share a scale: those of a channel, vertical or not, in a phase of an episode; and how long their errors last.
+//! Which white residuals share a scale: those of a channel, vertical or not, in a phase of an episode, at one time scale.
+//!
+//! What a model gets wrong is not white: a path that bends away is wrong for long, a contact that chatters is wrong in each reading and right on average. Haar's
+//! wavelets tell the two apart (Wornell, Proceedings of the IEEE 81, 1993: they make processes with long memory nearly white, with one variance for each octave). The
+//! residuals of a component in a phase are replaced by half differences of neighbours, of neighbouring pairs, of neighbouring fours, …, and their mean: an
+//! orthonormal change of coordinates, under which the noise of sensors stays white.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::ops::Range;
 
 use nalgebra::DVector;
 
-use crate::likelihood::Cells;
 use crate::trial::{Block, Kind, Phase};
 
 /// A channel, whether its component is the vertical one, and a phase.
 pub(crate) type Key = (Kind, bool, Phase);
-
-/// Correlation of neighbours, at most: no longer course is seen in an episode.
-const MOST: f64 = 0.98;
 
 /// The key of a block whose middle row is in `phase`. Of joints no component is vertical.
 pub(crate) fn key(block: &Block, phase: Phase) -> Key {
@@ -20,108 +21,145 @@ pub(crate) fn key(block: &Block, phase: Phase) -> Key {
     (block.kind, block.component == 2 && !joints, phase)
 }
 
-/// How long errors last in each cell, in blocks.
+/// The cells of the residuals of an episode.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Times(BTreeMap<Key, f64>);
-
-#[derive(Default)]
-struct Sums {
-    /// Σ r² and, over neighbours r, r′ of a component, Σ r r′.
-    square: f64,
-    neighbours: f64,
-    /// Number of runs of neighbours, and of residuals.
-    runs: usize,
-    count: usize,
+pub struct Cells {
+    /// Cell of each residual.
+    pub of: Vec<usize>,
+    /// Number of cells.
+    pub count: usize,
+    /// Residuals of one component in one phase, one after another.
+    pub(crate) runs: Vec<Range<usize>>,
 }
 
-impl Times {
-    /// Of white residuals. `episodes`: blocks with their keys, and their residuals, of each episode.
-    pub(crate) fn of<'a>(episodes: impl Iterator<Item = (&'a [Block], &'a [Key], &'a DVector<f64>)>) -> Self {
-        let mut cells: BTreeMap<Key, Sums> = BTreeMap::new();
-        for (blocks, keys, residuals) in episodes {
-            for (place, key) in keys.iter().enumerate() {
-                let follows =
-                    place > 0 && keys[place - 1] == *key && blocks[place - 1].component == blocks[place].component;
-                let sums = cells.entry(*key).or_default();
-                sums.square += residuals[place] * residuals[place];
-                sums.count += 1;
-                if follows {
-                    sums.neighbours += residuals[place - 1] * residuals[place];
-                } else {
-                    sums.runs += 1;
-                }
-            }
-        }
-        // As of an autoregressive process, and no longer than the cell itself.
-        let time = |sums: &Sums| {
-            let correlation = (sums.neighbours / sums.square).clamp(0.0, MOST);
-            let longest = sums.count as f64 / sums.runs as f64;
-            ((1.0 + correlation) / (1.0 - correlation)).min(longest)
-        };
-        let times = cells.iter().map(|(key, sums)| (*key, time(sums)));
-        Self(times.filter(|(_, time)| *time > 1.0).collect())
+impl Cells {
+    /// One cell of residuals that are left as they are.
+    #[must_use]
+    pub fn one(count: usize) -> Self {
+        Self { of: vec![0; count], count: 1, runs: Vec::new() }
     }
 
-    /// The cells of an episode with these keys.
-    pub(crate) fn cells(&self, keys: &[Key]) -> Arc<Cells> {
-        let mut places: BTreeMap<Key, usize> = BTreeMap::new();
-        let mut times = Vec::new();
-        let of = keys.iter().map(|key| {
-            *places.entry(*key).or_insert_with(|| {
-                times.push(self.0.get(key).copied().unwrap_or(1.0));
-                times.len() - 1
-            })
-        });
-        let of = of.collect();
-        Arc::new(Cells { of, times })
+    /// Of blocks with these keys.
+    pub(crate) fn new(blocks: &[Block], keys: &[Key]) -> Self {
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for place in 0..keys.len() {
+            let goes_on =
+                place > 0 && keys[place - 1] == keys[place] && blocks[place - 1].component == blocks[place].component;
+            match runs.last_mut().filter(|_| goes_on) {
+                Some(run) => run.end = place + 1,
+                None => runs.push(place..place + 1),
+            }
+        }
+        let mut places: BTreeMap<(Key, u32), usize> = BTreeMap::new();
+        let mut of = Vec::with_capacity(keys.len());
+        for run in &runs {
+            for octave in octaves(run.len()) {
+                let next = places.len();
+                of.push(*places.entry((keys[run.start], octave)).or_insert(next));
+            }
+        }
+        Self { of, count: places.len(), runs }
+    }
+
+    /// Residuals in the coordinates of the cells.
+    pub(crate) fn transform(&self, mut residuals: DVector<f64>) -> DVector<f64> {
+        for run in &self.runs {
+            haar(&mut residuals.as_mut_slice()[run.clone()], &mut |_, _| {});
+        }
+        residuals
+    }
+}
+
+/// Octave of each coefficient of a run of so many residuals: half of how many it compares; of the mean one more than the largest.
+fn octaves(count: usize) -> Vec<u32> {
+    let mut octaves = vec![0; count];
+    haar(&mut vec![0.0; count], &mut |place, octave| octaves[place] = octave);
+    octaves
+}
+
+/// Haar's wavelets in place. Where a number is left over it waits for the next octave, with the weight that it has there (unbalanced Haar).
+fn haar(values: &mut [f64], tell: &mut dyn FnMut(usize, u32)) {
+    // Places of the sums so far, and of how many residuals each is.
+    let mut sums: Vec<(usize, f64)> = (0..values.len()).map(|place| (place, 1.0)).collect();
+    let mut octave = 0;
+    while sums.len() > 1 {
+        let mut next = Vec::with_capacity(sums.len().div_ceil(2));
+        for pair in sums.chunks(2) {
+            let [(a, of_a), (b, of_b)] = pair else {
+                next.push(pair[0]);
+                continue;
+            };
+            let (first, second, both) = (values[*a], values[*b], (of_a + of_b).sqrt());
+            values[*a] = (of_a.sqrt() * first + of_b.sqrt() * second) / both;
+            values[*b] = (of_b.sqrt() * first - of_a.sqrt() * second) / both;
+            tell(*b, octave);
+            next.push((*a, of_a + of_b));
+        }
+        sums = next;
+        octave += 1;
+    }
+    if let Some((mean, _)) = sums.first() {
+        tell(*mean, octave);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use pomdp::{Purpose, Seed};
-    use rand_distr::{Distribution as _, StandardNormal};
-
     use super::*;
 
-    fn blocks(kind: Kind, count: usize) -> Vec<Block> {
-        (0..count).map(|first| Block { kind, component: 0, first, end: first + 1 }).collect()
+    fn blocks(kind: Kind, component: usize, count: usize) -> Vec<Block> {
+        (0..count).map(|first| Block { kind, component, first, end: first + 1 }).collect()
+    }
+
+    fn cells(blocks: &[Block], phase: Phase) -> Cells {
+        let keys: Vec<Key> = blocks.iter().map(|block| key(block, phase)).collect();
+        Cells::new(blocks, &keys)
     }
 
     #[test]
-    fn errors_of_an_autoregressive_process_last_as_long_as_its_correlation_says() {
-        let time = |correlation: f64| {
-            let mut rng = Seed(5).stream(Purpose::Test, 0);
-            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-            let blocks = blocks(Kind::WristForce, 80);
-            let keys: Vec<Key> = blocks.iter().map(|block| key(block, Phase::Sliding)).collect();
-            let episodes: Vec<DVector<f64>> = (0..20)
-                .map(|_| {
-                    let mut x = normal();
-                    DVector::from_fn(80, |_, _| {
-                        x = correlation * x + (1.0 - correlation * correlation).sqrt() * normal();
-                        x
-                    })
-                })
+    fn the_change_of_coordinates_is_orthonormal() {
+        for count in [1, 2, 5, 8, 13] {
+            let cells = cells(&blocks(Kind::WristForce, 0, count), Phase::Sliding);
+            let columns: Vec<DVector<f64>> = (0..count)
+                .map(|place| cells.transform(DVector::from_fn(count, |row, _| f64::from(u8::from(row == place)))))
                 .collect();
-            let times = Times::of(episodes.iter().map(|residuals| (&blocks[..], &keys[..], residuals)));
-            times.cells(&keys).times[0]
+            for (i, a) in columns.iter().enumerate() {
+                for (j, b) in columns.iter().enumerate() {
+                    assert!((a.dot(b) - f64::from(u8::from(i == j))).abs() < 1e-12, "{count}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_chatters_and_what_lasts_are_in_cells_of_their_own() {
+        let cells = cells(&blocks(Kind::WristForce, 0, 8), Phase::Sliding);
+        // Four differences of neighbours, two of pairs, one of fours, the mean.
+        let mut sizes = vec![0; cells.count];
+        cells.of.iter().for_each(|cell| sizes[*cell] += 1);
+        sizes.sort_unstable();
+        assert_eq!(sizes, [1, 1, 2, 4]);
+        let energy = |f: fn(usize) -> f64| -> Vec<f64> {
+            let found = cells.transform(DVector::from_fn(8, |row, _| f(row)));
+            let mut energy = vec![0.0; cells.count];
+            found.iter().zip(&cells.of).for_each(|(x, cell)| energy[*cell] += x * x);
+            energy
         };
-        assert!(time(0.0) < 1.1, "{}", time(0.0));
-        assert!((7.0..11.0).contains(&time(0.8)), "{}", time(0.8));
+        let chatter = energy(|row| if row % 2 == 0 { 1.0 } else { -1.0 });
+        let lasting = energy(|_| 1.0);
+        for (a, b) in chatter.iter().zip(&lasting) {
+            assert!(a * b < 1e-12, "{chatter:?} {lasting:?}");
+        }
+        assert!((chatter.iter().sum::<f64>() - 8.0).abs() < 1e-12 && (lasting.iter().sum::<f64>() - 8.0).abs() < 1e-12);
     }
 
     #[test]
     fn cells_are_told_apart_by_channel_axis_and_phase() {
-        let all = [blocks(Kind::WristForce, 3), blocks(Kind::ObjectPosition, 2)].concat();
-        let keys: Vec<Key> = all.iter().map(|block| key(block, Phase::ContactOnset)).collect();
-        let residuals = DVector::from_vec(vec![30.0, 30.0, 30.0, 0.5, -0.5]);
-        let times = Times::of(std::iter::once((&all[..], &keys[..], &residuals)));
-        let cells = times.cells(&keys);
-        assert_eq!(cells.of, [0, 0, 0, 1, 1]);
-        // One course of three is worth one residual.
-        assert!(cells.times[0] > 2.0 && cells.times[0] <= 3.0 && cells.times[1] == 1.0, "{:?}", cells.times);
+        let all = [blocks(Kind::WristForce, 0, 1), blocks(Kind::WristForce, 1, 1), blocks(Kind::ObjectPosition, 0, 1)];
+        let cells = cells(&all.concat(), Phase::ContactOnset);
+        // Both horizontal components share theirs, and no difference is taken across components.
+        assert_eq!(cells.of, [0, 0, 1]);
         let upward = Block { kind: Kind::WristForce, component: 2, first: 0, end: 1 };
-        assert_ne!(key(&upward, Phase::ContactOnset), keys[0]);
+        assert_ne!(key(&upward, Phase::ContactOnset), key(&all[0][0], Phase::ContactOnset));
     }
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::accept::Episodes;
+use crate::candidate::Candidate;
 use crate::fit::Fit;
 use crate::likelihood::{Stack, trimmed_mean};
 use crate::rival::{Rival, Round};
@@ -18,6 +19,10 @@ pub struct Findings {
     pub log_evidence: f64,
     /// By how much that is more than the gain of the best other effect.
     pub margin: f64,
+    /// Whether it was fitted to all episodes, not to those of the screening alone.
+    pub whole: bool,
+    /// Number of its coordinates.
+    pub coordinates: usize,
     /// Mean gain in ln p of the fitted episodes, in its standard errors.
     pub steadiness: f64,
     /// The same of those held out.
@@ -43,44 +48,65 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Of a rival of a round.
-    pub(crate) fn of(search: &Search, round: &Round, rival: &Rival, episodes: &Episodes) -> Self {
-        let raws = [&round.base, &rival.fit].map(|fit| search.kept.raw(&fit.model.hypothesis(&fit.x)));
-        let white = |(fit, raw): (&Fit, &Vec<Vec<f64>>)| search.kept.white(raw, fit.model.engine_errors(&fit.x));
-        let [without, with] = [white((&round.base, &raws[0])), white((&rival.fit, &raws[1]))];
+    /// Of all rivals of a round, those passed over among them, the most probable first.
+    pub(crate) fn of_round(search: &Search, round: &Round, episodes: &Episodes) -> Vec<Self> {
+        let raw = search.kept.raw(&round.base.model.hypothesis(&round.base.x));
+        let mut rivals: Vec<&Rival> = round.passed_over_kinds().chain(&round.rivals).collect();
+        rivals.retain(|rival| !rival.heldout.costs.is_empty());
+        rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let gains: Vec<_> = rivals.iter().map(|rival| (rival.kind(), rival.gain)).collect();
+        let margin = |rival: &Rival| {
+            let others = gains.iter().filter(|(kind, _)| *kind != rival.kind()).map(|(_, gain)| *gain);
+            rival.gain - others.fold(0.0, f64::max)
+        };
+        rivals.into_iter().map(|rival| Self::of(search, (round, &raw), (rival, margin(rival)), episodes)).collect()
+    }
+
+    fn of(
+        search: &Search,
+        (round, raw): (&Round, &Vec<Vec<f64>>),
+        (rival, margin): (&Rival, f64),
+        episodes: &Episodes,
+    ) -> Self {
+        let raws = [raw, &search.kept.raw(&rival.fit.model.hypothesis(&rival.fit.x))];
+        let white = |fit: &Fit, raw: &Vec<Vec<f64>>| search.kept.white(raw, fit.model.engine_errors(&fit.x));
+        let [without, with] = [white(&round.base, raws[0]), white(&rival.fit, raws[1])];
         let errors = |stack: &Stack, of: &dyn Fn(Kind) -> bool| search.heldout_errors(stack, episodes, of);
         let all = |_: Kind| true;
         let [before, after] = [&without, &with].map(|stack| errors(stack, &all));
         let drops: Vec<f64> = before.iter().zip(&after).map(|(before, after)| (before / after).ln()).collect();
         let trimmed = |errors: Vec<f64>| if errors.is_empty() { 1.0 } else { trimmed_mean(errors) };
-        let others = round.rivals.iter().filter(|other| other.kind() != rival.kind()).map(|other| other.gain);
         let heldout = round.before.gains(&rival.heldout);
         let by_episode = |gains: &[f64], pieces: &[std::ops::Range<usize>]| -> Vec<f64> {
             pieces.iter().map(|piece| gains[piece.clone()].iter().sum()).collect()
         };
-        let fitted: Vec<f64> = if rival.whole {
-            let [before, after] = [&round.base, &rival.fit].map(|fit| fit.residuals.costs());
-            let gains: Vec<f64> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
-            by_episode(&gains, &episodes.fitted)
+        // Of one that was fitted to some episodes all are looked at as well.
+        let costs = if rival.whole {
+            rival.fit.residuals.costs()
         } else {
-            Vec::new()
+            let raw = search.study.raw(&rival.fit.model.hypothesis(&rival.fit.x));
+            search.study.white(&raw, rival.fit.model.engine_errors(&rival.fit.x)).costs()
         };
+        let gains: Vec<f64> =
+            round.base.residuals.costs().iter().zip(&costs).map(|(before, after)| before - after).collect();
         let part = rival.fit.model.parts.last();
         let own = part.map_or(&[][..], |part| &rival.fit.x[rival.fit.x.len() - part.coordinates.len()..]);
-        let strengths = part.into_iter().flat_map(|part| part.strengths()).map(|index| own[index].abs());
+        let strengths = part.into_iter().flat_map(Candidate::strengths).map(|index| own[index].abs());
         Self {
             effect: rival.kind().name().into(),
             log_evidence: rival.gain,
-            margin: rival.gain - others.fold(0.0, f64::max),
-            steadiness: steadiness(&fitted),
+            margin,
+            whole: rival.whole,
+            coordinates: own.len(),
+            steadiness: steadiness(&by_episode(&gains, &episodes.fitted)),
             heldout_steadiness: steadiness(&by_episode(&heldout, &episodes.heldout)),
             drop: drops.iter().sum::<f64>() / drops.len().max(1) as f64,
             before: trimmed(before),
             after: trimmed(after),
             motion_after: trimmed(errors(&with, &is_motion)),
             force_after: trimmed(errors(&with, &is_force)),
-            motion_share: raws.each_ref().map(|raw| search.heldout_share(raw, Kind::ObjectPosition)),
-            force_share: raws.each_ref().map(|raw| search.heldout_share(raw, Kind::WristForce)),
+            motion_share: raws.map(|raw| search.heldout_share(raw, Kind::ObjectPosition)),
+            force_share: raws.map(|raw| search.heldout_share(raw, Kind::WristForce)),
             size: strengths.fold(0.0, f64::max),
             episodes: [episodes.fitted.len(), episodes.heldout.len()],
         }
@@ -103,6 +129,8 @@ impl Findings {
             effect: String::new(),
             log_evidence: 0.0,
             margin: 0.0,
+            whole: true,
+            coordinates: 0,
             steadiness: 0.0,
             heldout_steadiness: 0.0,
             drop: 0.0,

@@ -65,16 +65,20 @@ const SYSTEMATIC_SHARE: f64 = 0.01;
 /// the recorded logs' intervals missed by a fiftieth of its width. To be measured again.
 const TOO_NARROW: f64 = 2.0;
 
+/// The middle 90 % of a normal distribution reach so many standard deviations to either side.
+const NORMAL_90: f64 = 1.645;
+
 /// Moves resamples of a fit away from it, so that their spread covers what a bootstrap cannot see. Systematic errors are a share of the strengths of
-/// each effect.
-pub fn widen(samples: &mut [Vec<f64>], fit: &Fit) {
+/// each effect: one standard deviation is `share`, by which the model is still off where the object goes, or what the engine is never better than.
+pub fn widen(samples: &mut [Vec<f64>], fit: &Fit, share: f64) {
+    let share = SYSTEMATIC_SHARE.max(NORMAL_90 * share);
     let model = &fit.model;
     let mut systematic = vec![0.0; fit.x.len()];
     let mut first = model.tunables + model.errors;
     for part in &model.parts {
         let strengths = || part.strengths().map(|index| first + index);
         let size = strengths().map(|index| fit.x[index].powi(2)).sum::<f64>().sqrt();
-        strengths().for_each(|index| systematic[index] = SYSTEMATIC_SHARE * size);
+        strengths().for_each(|index| systematic[index] = share * size);
         first += part.coordinates.len();
     }
     for (index, (x, systematic)) in fit.x.iter().zip(systematic).enumerate() {
@@ -160,7 +164,7 @@ mod tests {
         let (fit, _) = linear(27, 3);
         let samples = bootstrap(&fit, &each(&fit), 3).unwrap();
         let mut wide = samples.clone();
-        widen(&mut wide, &fit);
+        widen(&mut wide, &fit, 0.0);
         for (sample, wide) in samples.iter().zip(&wide) {
             assert!((wide[0] - fit.x[0] - TOO_NARROW * (sample[0] - fit.x[0])).abs() < 1e-12);
         }

@@ -1,27 +1,20 @@
 //! How improbable residuals are, if contacts may go another way than their model.
 //!
 //! White residuals of a right model have variance 1. The contacts of a real table, and those of any other engine, rise, let go and come back in other
-//! ticks than the simulated ones, and what is touched may go another way. Such errors are large in some channels and phases of some episodes, and say
-//! nothing about the rest. The n residuals of each cell (a channel in a phase of an episode) therefore follow Student's distribution with n degrees of
-//! freedom, one scale for all of them: with χ² their sum of squares, −ln p = n ln(1 + χ² / n) but for a constant. Near χ² = n this is
+//! ticks than the simulated ones, and what is touched may go another way. Such errors are large in some channels, phases and time scales of some episodes, and say
+//! nothing about the rest. The n residuals of each cell (see [`crate::cells`]) therefore follow Student's multivariate distribution with ν = max(n, 8) degrees of
+//! freedom, one scale for all of them: with χ² their sum of squares, −ln p = (ν + n)/2 ln(1 + χ² / ν) but for a constant. Near χ² = n this is
 //! ½ χ², as for normal residuals; a cell that no model explains has little say.
-//!
-//! Errors of a model are correlated in time: n residuals with the correlation time τ are worth n / τ. Each cell's −ln p is divided by its τ
-//! (magnitude adjustment of composite likelihoods: Pauli, Racugno and Ventura, Statistica Sinica 21, 2011).
 
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 
 use nalgebra::DVector;
 
-/// Which cell each residual of an episode belongs to, and what each is worth.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Cells {
-    /// Cell of each residual.
-    pub of: Vec<usize>,
-    /// Correlation time of each cell, in residuals.
-    pub times: Vec<f64>,
-}
+use crate::cells::Cells;
+
+/// Degrees of freedom, at least: how far a cell of few residuals may be off is not known from these alone.
+const LEAST_FREEDOM: f64 = 8.0;
 
 /// White residuals of some episodes, one vector each.
 #[derive(Clone, Debug, Default)]
@@ -46,16 +39,13 @@ impl Stack {
     /// −ln p of each episode, but for a constant.
     #[must_use]
     pub fn costs(&self) -> Vec<f64> {
-        let one = |sums: Vec<(f64, usize)>, cells: &Cells| {
-            sums.iter().zip(&cells.times).map(|((chi2, count), time)| episode_cost(*chi2, *count) / time).sum()
-        };
-        self.sums().zip(&self.cells).map(|(sums, cells)| one(sums, cells)).collect()
+        self.sums().map(|sums| sums.iter().map(|(chi2, count)| episode_cost(*chi2, *count)).sum()).collect()
     }
 
     /// χ² and number of residuals of each cell, episode by episode.
     fn sums(&self) -> impl Iterator<Item = Vec<(f64, usize)>> + '_ {
         self.episodes.iter().zip(&self.cells).map(|(residuals, cells)| {
-            let mut sums = vec![(0.0, 0); cells.times.len()];
+            let mut sums = vec![(0.0, 0); cells.count];
             for (residual, cell) in residuals.iter().zip(&cells.of) {
                 sums[*cell].0 += residual * residual;
                 sums[*cell].1 += 1;
@@ -83,7 +73,7 @@ impl DerefMut for Stack {
 impl FromIterator<DVector<f64>> for Stack {
     fn from_iter<T: IntoIterator<Item = DVector<f64>>>(episodes: T) -> Self {
         let episodes: Vec<DVector<f64>> = episodes.into_iter().collect();
-        let one = |residuals: &DVector<f64>| Arc::new(Cells { of: vec![0; residuals.len()], times: vec![1.0] });
+        let one = |residuals: &DVector<f64>| Arc::new(Cells::one(residuals.len()));
         Self { cells: episodes.iter().map(one).collect(), episodes }
     }
 }
@@ -110,11 +100,12 @@ pub fn cost(stack: &Stack) -> f64 {
     stack.costs().iter().sum()
 }
 
-/// −ln p of a cell with this sum of squares, whose residuals are independent.
+/// −ln p of a cell with this sum of squares.
 #[must_use]
 pub fn episode_cost(chi2: f64, count: usize) -> f64 {
-    let n = count.max(1) as f64;
-    n * (chi2 / n).ln_1p()
+    let n = count as f64;
+    let freedom = n.max(LEAST_FREEDOM);
+    0.5 * (freedom + n) * (chi2 / freedom).ln_1p()
 }
 
 /// Mean square of residuals.
@@ -140,20 +131,23 @@ const ODD: f64 = 0.25;
 #[must_use]
 pub fn trimmed_mean(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
-    values.truncate(values.len() - (ODD * values.len() as f64).ceil() as usize);
+    // Of a single one nothing is odd.
+    let odd = (ODD * values.len() as f64).ceil() as usize;
+    values.truncate((values.len() - odd).max(1));
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// The weight of each residual in a step of least squares: −ln p has the derivative `weight` · residual.
 #[must_use]
 pub fn weights(stack: &Stack) -> Vec<DVector<f64>> {
-    let of_cells = |sums: Vec<(f64, usize)>, cells: &Cells| -> Vec<f64> {
-        let one = |((chi2, count), time): (&(f64, usize), &f64)| 2.0 / (time * (1.0 + chi2 / (*count).max(1) as f64));
-        sums.iter().zip(&cells.times).map(one).collect()
+    let one = |(chi2, count): (f64, usize)| {
+        let n = count as f64;
+        let freedom = n.max(LEAST_FREEDOM);
+        (1.0 + n / freedom) / (1.0 + chi2 / freedom)
     };
     (stack.sums().zip(&stack.cells))
         .map(|(sums, cells)| {
-            let weights = of_cells(sums, cells);
+            let weights: Vec<f64> = sums.into_iter().map(one).collect();
             DVector::from_iterator(cells.of.len(), cells.of.iter().map(|cell| weights[*cell]))
         })
         .collect()
@@ -186,7 +180,8 @@ mod tests {
     #[test]
     fn weights_are_those_of_the_gradient_in_every_cell() {
         let residuals = vec![DVector::from_vec(vec![3.0, -1.0, 0.5]), DVector::from_vec(vec![0.1, 0.2])];
-        let cells = [Cells { of: vec![0, 1, 0], times: vec![4.0, 1.0] }, Cells { of: vec![0, 0], times: vec![1.5] }];
+        let cells =
+            [vec![0, 1, 0], vec![0, 0]].map(|of| Cells { count: 1 + of.iter().max().unwrap(), of, ..Cells::default() });
         let stack = Stack::new(residuals, cells.map(Arc::new).to_vec());
         let weights = weights(&stack);
         for (episode, row) in [(0, 0), (0, 1), (0, 2), (1, 1)] {
@@ -201,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_cell_that_no_model_explains_leaves_the_others_their_say() {
-        let cells = || vec![Arc::new(Cells { of: vec![0, 0, 1, 1], times: vec![1.0; 2] })];
+        let cells = || vec![Arc::new(Cells { of: vec![0, 0, 1, 1], count: 2, ..Cells::default() })];
         let with = |force: f64, place: f64| {
             cost(&Stack::new(vec![DVector::from_vec(vec![force, force, place, place])], cells()))
         };

@@ -16,8 +16,11 @@ use crate::units::Units;
 
 /// Engine step, s, at most.
 const LONGEST_STEP_SECS: f64 = 1.0 / 60.0;
-/// Friction of tool and object where the log does not say.
+/// Friction of tool and object where the log does not say, and its standard deviation as a share of it.
 const TOOL_FRICTION: f64 = 0.2;
+const TOOL_FRICTION_UNKNOWN: f64 = 0.5;
+/// The same of one that it says exactly: engines with cones, pyramids and patches slide at forces that differ by as much.
+const TOOL_FRICTION_SHARE: f64 = 0.15;
 
 /// Engine step, s, of what is thrown, at most: an eighth of a tick at 148 Hz.
 const THROWN_STEP_SECS: f64 = 0.000_85;
@@ -199,8 +202,8 @@ impl Nominal {
         };
         add("table.height_m".into(), header.table.height_m, false, Place::TableHeight);
         add("table.friction".into(), header.table.friction, true, Place::TableFriction);
-        if let Some(friction) = header.tool_friction {
-            add("tool_friction".into(), friction, true, Place::ToolFriction);
+        if self.has_tool() {
+            add("tool_friction".into(), self.tool_friction(), true, Place::ToolFriction);
         }
         let object = &header.object;
         add("object.mass_kg".into(), object.mass_kg, true, Place::Mass);
@@ -218,6 +221,16 @@ impl Nominal {
         }
         all.extend(self.contact());
         all
+    }
+
+    /// Friction of tool and object. One that is given exactly is exact in another law of friction than the engine's.
+    fn tool_friction(&self) -> Number {
+        let about = |mean: f64, share: f64| Number::Uncertain { mean, stddev: share * mean };
+        match self.header.tool_friction {
+            Some(Number::Fixed(mean)) if mean > 0.0 => about(mean, TOOL_FRICTION_SHARE),
+            Some(number) => number,
+            None => about(TOOL_FRICTION, TOOL_FRICTION_UNKNOWN),
+        }
     }
 
     /// How stiff contacts are, and how much they damp: no log says it, and engines differ by factors.
@@ -343,10 +356,7 @@ impl Nominal {
     pub fn rig(&self, z: &[f64], engine: &Engine) -> Rig {
         let header = &self.header;
         let steps = self.steps() * engine.refinement;
-        let tool_friction = match header.tool_friction {
-            Some(number) => self.value(z, Place::ToolFriction, number),
-            None => TOOL_FRICTION,
-        };
+        let tool_friction = self.value(z, Place::ToolFriction, self.tool_friction());
         let world = WorldConfig {
             control_period_secs: header.period_secs / f64::from(steps),
             control_steps: 1,

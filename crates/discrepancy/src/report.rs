@@ -1,5 +1,6 @@
 //! What a diagnosis says: the contract of `report.json`.
 
+use physics_model::EffectKind;
 use serde::Serialize;
 
 use crate::decision::Probabilities;
@@ -36,7 +37,7 @@ pub struct NamedEffect {
     pub name: &'static str,
     /// What it does, in a line.
     pub description: &'static str,
-    /// Probability that it is right ([`crate::decision`]): above one half where the verdict is `effect`.
+    /// Probability that it is right ([`crate::decision`]). Where the verdict is `effect`, those of all that were compared add up to more than one half.
     pub confidence: f64,
     /// Gain in ln evidence over the model without it; of one of several of what is thrown what the episodes of the screening say for all.
     pub log_evidence: f64,
@@ -66,6 +67,8 @@ pub struct RankedEffect {
     pub name: &'static str,
     /// Gain in ln evidence.
     pub log_evidence: f64,
+    /// That it is the right one.
+    pub probability: f64,
     /// Held-out mean square with it.
     pub heldout: f64,
 }
@@ -111,8 +114,8 @@ pub struct Report {
     pub summary: String,
     /// Named effects, in the order in which they were accepted.
     pub effects: Vec<NamedEffect>,
-    /// Names that the data do not tell apart: with tempered odds above 1 to 20 beside the first, those with more evidence that did not convince among them, weighed by all episodes. Where nothing is named, what the evidence leans to, by too
-    /// little or without lasting: the best rival that gains anything, and those as near to it.
+    /// Names that the data do not tell apart: with odds above 1 to 20 beside the most probable one, which is the first. Where nothing is named, what the
+    /// log leans to.
     pub confusion_set: Vec<&'static str>,
     /// Fitted rivals of the first round, those among them that gain more than what was named but explain held-out episodes worse.
     pub ranking: Vec<RankedEffect>,
@@ -128,10 +131,10 @@ pub struct Report {
     pub contact_gap: Option<ContactGap>,
     /// Held-out comparison.
     pub heldout: Heldout,
-    /// Probabilities that the best effect of the search is right, that nothing is missing, and that something else is.
+    /// Probabilities of the effects that were compared for the first place, the most probable first, of nothing and of something else: they add up to 1.
     pub probabilities: Probabilities,
-    /// What speaks for the best effect of each round of the search: what the decision is made of.
-    pub findings: Vec<Findings>,
+    /// What speaks for each effect that each round of the search compared: what the decision is made of.
+    pub findings: Vec<Vec<Findings>>,
     /// The nominal model, re-tuned.
     pub retuned: Vec<Retuned>,
     /// Held-out episodes before and after, for plots.
@@ -242,13 +245,12 @@ impl Report {
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
         let [before, after] = diagnosis.reported.errors();
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed).unwrap_or_default();
-        widen(&mut samples, &diagnosis.model);
+        widen(&mut samples, &diagnosis.model, unexplained_share(diagnosis));
         let effects = effects(diagnosis, &samples);
         let verdict = diagnosis.verdict;
-        let unknown = verdict == Verdict::Unknown;
-        let confusion_set = confusion_set(diagnosis, settings, &effects);
+        let confusion_set = confusion_set(&diagnosis.probabilities, settings.confusion);
         let summary = summary(verdict, &effects, before, after);
-        let description = unknown.then(|| describe(diagnosis));
+        let description = diagnosis.is_open().then(|| describe(diagnosis));
         Self {
             version: 1,
             verdict,
@@ -279,7 +281,7 @@ impl Report {
                 unit: "chi2 per sample",
                 episodes: diagnosis.reported.episodes.clone(),
             },
-            probabilities: diagnosis.probabilities,
+            probabilities: diagnosis.probabilities.clone(),
             findings: diagnosis.findings.clone(),
             retuned: retuned(diagnosis, &samples),
             effects,
@@ -295,6 +297,14 @@ impl Report {
     }
 }
 
+/// By how much the model is still off where the object goes, as a share of how far it does; 0 without an effect.
+fn unexplained_share(diagnosis: &Diagnosis) -> f64 {
+    let parts = &diagnosis.model.model.parts;
+    let named = |found: &&Findings| parts.iter().any(|part| part.kind().name() == found.effect);
+    let found = diagnosis.findings.iter().flatten().find(named);
+    found.map_or(0.0, |found| found.motion_share[1])
+}
+
 fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
     let model = &diagnosis.model.model;
     let fitted = diagnosis.effects(&diagnosis.model.x);
@@ -302,7 +312,6 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
     (model.parts.iter().enumerate())
         .map(|(place, part)| {
             let kind = part.kind();
-            let round = &diagnosis.rounds[place];
             let parameters = (part.coordinates.iter())
                 .map(|coordinate| {
                     let parameter = &kind.parameters()[coordinate.index];
@@ -320,7 +329,11 @@ fn effects(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<NamedEffect> {
                 name: kind.name(),
                 description: kind.description(),
                 confidence: diagnosis.confidences[place],
-                log_evidence: round.rivals[0].gain,
+                log_evidence: diagnosis
+                    .rounds
+                    .get(place)
+                    .and_then(|round| round.rival(kind.name()))
+                    .map_or(0.0, |rival| rival.gain),
                 parameters,
             }
         })
@@ -335,25 +348,11 @@ fn bare(key: &str) -> &str {
     }
 }
 
-fn confusion_set(diagnosis: &Diagnosis, settings: &Settings, effects: &[NamedEffect]) -> Vec<&'static str> {
-    let Some(round) = diagnosis.rounds.first() else { return Vec::new() };
-    let named = effects.first().map(|first| first.log_evidence);
-    let passed = round.passed_over();
-    let first = named.or_else(|| round.rivals.first().map(|rival| rival.gain)).unwrap_or(0.0);
-    let passed = passed.iter().map(|(kind, more)| (kind.name(), first + more));
-    let mut gains: Vec<(&str, f64)> = round.rivals.iter().map(|rival| (rival.kind().name(), rival.gain)).collect();
-    gains.extend(passed);
-    if named.is_none() {
-        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
-    }
-    near_the_first(gains.into_iter(), named, settings.near())
-}
-
-/// Of rivals, the most probable first, those nearer than this to what was named; where nothing was, to the first of those that gain anything.
-fn near_the_first<'a>(rivals: impl Iterator<Item = (&'a str, f64)>, named: Option<f64>, near: f64) -> Vec<&'a str> {
-    let mut rivals = rivals.filter(|(_, gain)| named.is_some() || *gain > 0.0).peekable();
-    let Some(best) = named.or_else(|| rivals.peek().map(|(_, gain)| *gain)) else { return Vec::new() };
-    rivals.filter(|(_, gain)| best - gain < near).map(|(name, _)| name).collect()
+/// Names that are not told apart: those whose odds beside the most probable one are above one to `confusion`.
+fn confusion_set(probabilities: &Probabilities, confusion: f64) -> Vec<&'static str> {
+    let (_, most) = probabilities.best();
+    let near = probabilities.effects.iter().filter(|(_, probability)| confusion * probability > most);
+    near.filter_map(|(name, _)| EffectKind::ALL.iter().map(|kind| kind.name()).find(|kind| kind == name)).collect()
 }
 
 fn ranking(diagnosis: &Diagnosis) -> Vec<RankedEffect> {
@@ -365,6 +364,7 @@ fn ranking(diagnosis: &Diagnosis) -> Vec<RankedEffect> {
         .map(|rival| RankedEffect {
             name: rival.kind().name(),
             log_evidence: rival.gain,
+            probability: diagnosis.probabilities.of(rival.kind().name()),
             heldout: heldout(rival.kind()),
         })
         .collect()
@@ -396,7 +396,7 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
                 "The model lacks {names}. With {it} the held-out error {goes} from {before:.2} to {after:.2} (noise alone gives 1)."
             )
         }
-        Verdict::None if before < 1.5 => {
+        Verdict::None if before <= separate::OPEN => {
             format!("The re-tuned model explains this log: its held-out error is {before:.2} (noise alone gives 1).")
         }
         Verdict::None => format!(
@@ -443,12 +443,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_near_the_name_is_not_told_apart_and_without_one_what_gains() {
-        let rivals = [("table_tilt", 40.0), ("constant_force", 30.0), ("adhesion", 9.0), ("tether", -2.0)];
-        assert_eq!(near_the_first(rivals.into_iter(), Some(40.0), 15.0), ["table_tilt", "constant_force"]);
-        assert_eq!(near_the_first(rivals.into_iter(), None, 15.0), ["table_tilt", "constant_force"]);
-        // A loss is nearer to nothing than to a name.
-        assert_eq!(near_the_first(rivals.into_iter().skip(2), None, 15.0), ["adhesion"]);
-        assert!(near_the_first(rivals.into_iter().skip(3), None, 15.0).is_empty());
+    fn what_is_nearly_as_probable_is_not_told_apart() {
+        let effects = [("table_tilt", 0.6), ("constant_force", 0.2), ("adhesion", 0.02)];
+        let effects = effects.map(|(name, probability)| (name.to_string(), probability)).to_vec();
+        let found = Probabilities { effects, none: 0.1, unknown: 0.08 };
+        assert_eq!(confusion_set(&found, 20.0), ["table_tilt", "constant_force"]);
+        assert!(confusion_set(&Probabilities { effects: Vec::new(), none: 1.0, unknown: 0.0 }, 20.0).is_empty());
     }
 }

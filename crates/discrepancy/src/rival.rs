@@ -74,12 +74,10 @@ impl Round {
         self.passed_over.iter().filter(|rival| self.rivals.iter().all(|found| found.kind() != rival.kind()))
     }
 
-    /// Of these the kind, and by how much more they explain all episodes than the first rival does, those held out among them: ln evidence of what was
-    /// fitted, ln p of what was not.
-    pub(crate) fn passed_over(&self) -> Vec<(EffectKind, f64)> {
-        let Some(first) = self.rivals.first() else { return Vec::new() };
-        let all = |rival: &Rival| rival.gain + self.before.gains(&rival.heldout).iter().sum::<f64>();
-        self.passed_over_kinds().map(|rival| (rival.kind(), all(rival) - all(first))).collect()
+    /// The rival of this name that gains most.
+    pub(crate) fn rival(&self, name: &str) -> Option<&Rival> {
+        let named = self.rivals.iter().chain(&self.passed_over).filter(|rival| rival.kind().name() == name);
+        named.max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
     /// The fit of the first rival, or that of the model without one.
@@ -124,34 +122,29 @@ mod tests {
     use crate::likelihood::Stack;
     use crate::model::Model;
 
-    fn left_of(cost: f64) -> Heldout {
-        Heldout { squares: Vec::new(), costs: vec![cost] }
-    }
-
-    /// A rival that gains so much and leaves such a −ln p of held-out residuals.
-    fn rival(kind: EffectKind, gain: f64, left: f64) -> Rival {
+    /// A rival that gains so much.
+    fn rival(kind: EffectKind, gain: f64) -> Rival {
         let candidate = candidates(&context()).into_iter().find(|candidate| candidate.kind() == kind).unwrap();
         let model = Model::nominal(0, 0).with(&candidate);
         let fit = Fit::new(model, Vec::new(), Vec::new(), Stack::default(), Vec::new());
-        Rival { fit, whole: true, gain, heldout: left_of(left) }
+        Rival { fit, whole: true, gain, heldout: Heldout::default() }
     }
 
     #[test]
-    fn what_held_out_episodes_speak_against_is_weighed_by_all_of_them() {
+    fn a_rival_is_found_by_its_name_also_where_it_was_passed_over() {
         use EffectKind as K;
-        let rivals = vec![rival(K::TimeBase, 80.0, 104.0), rival(K::FrictionLevel, 40.0, 98.0)];
-        let base = rival(K::Tether, 0.0, 100.0).fit;
+        let rivals = vec![rival(K::TimeBase, 80.0), rival(K::FrictionLevel, 40.0), rival(K::FrictionLevel, 50.0)];
+        let (promises, base) = (Vec::new(), rival(K::Tether, 0.0).fit);
         let mut round =
-            Round { promises: Vec::new(), rivals, passed_over: Vec::new(), base, before: left_of(100.0), hasty: false };
-        assert!(round.passed_over().is_empty());
+            Round { promises, rivals, passed_over: Vec::new(), base, before: Heldout::default(), hasty: false };
         round.pass_over(1);
-        let [(kind, more)] = round.passed_over()[..] else { panic!("one was passed over") };
-        // 40 of what was fitted, less what the held-out ones say.
-        assert_eq!(kind, K::TimeBase);
-        assert!((30.0..40.0).contains(&more), "{more}");
+        assert_eq!(round.rival("time_base").unwrap().gain, 80.0);
+        assert_eq!(round.rival("friction_level").unwrap().gain, 50.0);
+        assert!(round.rival("tether").is_none());
+        assert_eq!(round.passed_over_kinds().count(), 1);
         // Once it is a rival again it is no other.
-        round.rivals.push(rival(K::TimeBase, 10.0, 100.0));
-        assert!(round.passed_over().is_empty());
+        round.rivals.push(rival(K::TimeBase, 10.0));
+        assert_eq!(round.passed_over_kinds().count(), 0);
     }
 
     #[test]

@@ -5,8 +5,7 @@ use std::ops::Range;
 use nalgebra::DVector;
 use physics_model::EffectKind;
 
-use crate::accept::{Asked, Episodes, NEGLIGIBLE, better_heldout, both_convince, convinces, lasts, may_convince};
-use crate::begin::{begin, follow, promise_friction, shake};
+use crate::accept::{Asked, Episodes, better_heldout, both_convince, convinces, lasts, may_convince};
 use crate::candidate::Candidate;
 use crate::chain::{LEAST_SHARE, Link};
 use crate::diagnosis::Settings;
@@ -15,10 +14,11 @@ use crate::likelihood::{Stack, mean_square, trimmed_mean};
 use crate::locate::{Cell, locate};
 use crate::model::Model;
 use crate::rival::{Heldout, Rival, Round, first_of_each, of_first, sort};
-use crate::screen::{Promise, Screening, shortlist};
+use crate::screen::{Promise, Screening};
 use crate::study::Study;
 use crate::trial::Kind;
 
+mod quick;
 mod retune;
 
 /// What a further effect has to gain, as a share of what those before it did; less, down to the latter, where held-out episodes gain as well. So 2 of 9 pairs of
@@ -27,10 +27,6 @@ const SECOND_SHARE: f64 = 0.01;
 const LEAST_SECOND_SHARE: f64 = 0.0025;
 /// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
 const NEAR: f64 = 60.0;
-/// What promises less than this share of what another one gains is not fitted...
-const HOPELESS: f64 = 0.1;
-/// ... but for the first two kinds.
-const LEAST_KINDS: usize = 2;
 /// What keeps this share of what it promised in the episodes of the screening says what others would keep.
 const MOST_KEEP: f64 = 0.5;
 /// If an effect gains more than this in ln evidence of the episodes of the screening, a model without was no place to learn errors at.
@@ -317,7 +313,8 @@ impl Search<'_> {
         let Link { promises, mut quick, .. } = known.unwrap_or_else(|| self.link(screening, &part, &begin));
         let before = begin.log_evidence();
         let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
-        of_first(&mut quick, self.settings.fits, added_kind);
+        let kinds = if first { self.settings.quick_fits } else { self.settings.fits };
+        of_first(&mut quick, kinds, added_kind);
         let first_kind = quick.first().and_then(added_kind);
         let lead = quick.first().map_or(0.0, Fit::log_evidence);
         let without = base.log_evidence();
@@ -418,74 +415,9 @@ impl Search<'_> {
     pub(crate) fn learn_errors(&mut self, right: &Fit) {
         let hypothesis = right.model.hypothesis(&right.x);
         self.study.learn_errors(&hypothesis);
-        self.kept.learn_errors_as(&hypothesis, &self.study);
-        let study = &self.study;
-        self.reported.iter_mut().for_each(|reported| reported.learn_errors_as(&hypothesis, study));
+        self.kept.learn_errors(&hypothesis);
+        self.reported.iter_mut().for_each(|reported| reported.learn_errors(&hypothesis));
     }
-
-    /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.
-    pub(crate) fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
-        let before = base.log_evidence();
-        let share = self.share(screening);
-        let (mut quick, mut gained, mut kinds) = (Vec::<Fit>::new(), 0.0_f64, Vec::new());
-        for (promise, begun) in self.begun(part, base, promises) {
-            let (kind, model) = (promise.candidate.kind(), base.model.with(&promise.candidate));
-            let hopeless = kinds.len() >= LEAST_KINDS && promise.gain < HOPELESS * share * gained;
-            // The best one has to be fitted to all episodes, too.
-            if (hopeless && !kinds.contains(&kind)) || !self.affords_both(part, &model) {
-                continue;
-            }
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
-            }
-            let begin = begun.unwrap_or_else(|| begin(part, base, &model, &promise));
-            let fit = fit(part, model, begin, Effort::Quick);
-            gained = gained.max(fit.log_evidence() - before);
-            quick.push(fit);
-        }
-        quick.retain(|fit| fit.log_evidence().is_finite() && is_there(fit));
-        let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
-        sort(&mut quick);
-        // Half or one and a half times as strong an effect may lie beyond a ridge that no descent crosses.
-        let within = |fit: &Fit| self.affords_both(part, &fit.model);
-        if let Some(best) = quick.first_mut().filter(|best| within(best)) {
-            shake(part, best);
-        }
-        // Twins (a tilt and a force) reach the same optimum or neither: one that was found is where the other begins.
-        if let Some(best) = quick.first().cloned() {
-            quick.iter_mut().skip(1).filter(|other| within(other)).for_each(|other| follow(part, &best, other));
-            sort(&mut quick);
-        }
-        // Of one kind's several places the best.
-        first_of_each(&mut quick, |fit| fit.model.parts.last().map(Candidate::variant));
-        quick
-    }
-
-    /// What promises most. Beside another effect, which may have gone some of the way, a linear step says less than what is simulated where a fit begins.
-    fn begun(&self, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<(Promise, Option<Begin>)> {
-        if base.model.parts.is_empty() {
-            let promises = promise_friction(part, base, promises);
-            return shortlist(&promises, self.settings.quick_fits).into_iter().map(|promise| (promise, None)).collect();
-        }
-        let mut list = Vec::new();
-        for promise in shortlist(promises, self.settings.begins) {
-            let model = base.model.with(&promise.candidate);
-            if self.affords_both(part, &model) {
-                let begin = begin(part, base, &model, &promise);
-                list.push((begin.cost(part, &model), promise, begin));
-            }
-        }
-        list.sort_by(|a, b| a.0.total_cmp(&b.0));
-        of_first(&mut list, self.settings.fits, |(_, promise, _)| promise.candidate.kind());
-        list.into_iter().map(|(_, promise, begin)| (promise, Some(begin))).collect()
-    }
-}
-
-/// Whether a fit's last effect is more than negligible: what is as good as absent lasts nowhere, and is not worth a fit with care.
-fn is_there(fit: &Fit) -> bool {
-    let Some(part) = fit.model.parts.last() else { return false };
-    let own = &fit.x[fit.x.len() - part.coordinates.len()..];
-    part.begin.is_some() || part.strengths().any(|index| own[index].abs() > NEGLIGIBLE)
 }
 
 /// Kind of a fit's last effect.

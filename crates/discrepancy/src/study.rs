@@ -7,12 +7,12 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use crate::budget::Budget;
-use crate::cells::{Key, Times, key};
+use crate::cells::{Cells, Key, key};
 use crate::clock::Clock;
-use crate::likelihood::{Cells, Stack, episode_cost};
+use crate::likelihood::{Stack, episode_cost};
 use crate::nominal::Engine;
 use crate::simulator::{Hypothesis, Nudge, Simulator};
-use crate::trial::{Phase, groups};
+use crate::trial::{Block, Phase, groups};
 use crate::whitener::Whitener;
 
 /// Episodes with their whiteners.
@@ -28,7 +28,6 @@ pub struct Study<'a> {
     budget: Option<&'a Budget>,
     whiteners: Vec<Whitener>,
     cells: Vec<Arc<Cells>>,
-    times: Times,
     /// What an error of the engine of size one does to the residuals of each episode, one for each of the variants.
     engine_errors: Vec<Vec<DVector<f64>>>,
 }
@@ -66,12 +65,13 @@ impl<'a> Study<'a> {
         let plain = |index: &usize| Whitener::new(simulator.trials[*index].blocks.len(), &[]);
         let whiteners = chosen.iter().map(plain).collect();
         // What goes on is not known before a simulation: channels alone are told apart.
-        let times = Times::default();
-        let keys = |index: &usize| -> Vec<Key> {
-            simulator.trials[*index].blocks.iter().map(|block| key(block, Phase::FreeMotion)).collect()
+        let cells = |index: &usize| {
+            let blocks = &simulator.trials[*index].blocks;
+            let keys: Vec<Key> = blocks.iter().map(|block| key(block, Phase::FreeMotion)).collect();
+            Arc::new(Cells::new(blocks, &keys))
         };
-        let cells = chosen.iter().map(|index| times.cells(&keys(index))).collect();
-        Self { simulator, engine, chosen, budget: None, whiteners, cells, times, engine_errors: Vec::new() }
+        let cells = chosen.iter().map(cells).collect();
+        Self { simulator, engine, chosen, budget: None, whiteners, cells, engine_errors: Vec::new() }
     }
 
     /// The same with simulations that are taken from a budget.
@@ -111,15 +111,19 @@ impl<'a> Study<'a> {
         self.simulator.residuals(hypothesis, &self.engine, Nudge::default(), &self.chosen)
     }
 
-    /// Sets the clocks of a hypothesis to where what each stamps is explained best.
-    pub(crate) fn set_clocks(&self, hypothesis: &mut Hypothesis) {
-        if self.simulator.nominal.clocks() == 0 {
-            return;
+    /// Clocks at which what each stamps is explained best under a hypothesis, and the residuals of all episodes there, standardised but not white: one
+    /// simulation, whatever the clocks.
+    pub(crate) fn with_best_clocks(&self, hypothesis: &Hypothesis) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let clocks = self.simulator.nominal.clocks();
+        if clocks == 0 {
+            return (Vec::new(), self.raw(hypothesis));
         }
+        self.charge();
+        let grids: Vec<Vec<f64>> = Clock::ALL.iter().take(clocks).map(|clock| clock.grid()).collect();
         let scan = |index: &usize| self.simulator.scanned(hypothesis, &self.engine, *index);
         let scanned: Vec<_> = self.chosen.par_iter().map(scan).collect();
-        for (place, clock) in Clock::ALL.into_iter().enumerate().take(self.simulator.nominal.clocks()) {
-            let grid = clock.grid();
+        let best = |(place, grid): (usize, &Vec<f64>)| -> usize {
+            let clock = Clock::ALL[place];
             let cost = |at: usize| -> f64 {
                 let episode = |(index, scanned): (&usize, &Vec<Vec<Vec<f64>>>)| {
                     let blocks = self.simulator.trials[*index].blocks.iter().zip(&scanned[place][at]);
@@ -131,8 +135,25 @@ impl<'a> Study<'a> {
                 self.chosen.iter().zip(&scanned).map(episode).sum::<f64>() + 0.5 * grid[at] * grid[at]
             };
             let costs: Vec<f64> = (0..grid.len()).map(cost).collect();
-            let best = (0..grid.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b]));
-            hypothesis.z[place] = best.map_or(0.0, |best| grid[best]);
+            (0..grid.len()).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0)
+        };
+        let best: Vec<usize> = grids.iter().enumerate().map(best).collect();
+        // Each channel as its own clock stamps it; what none stamps is the same under all.
+        let raw = |(index, scanned): (&usize, &Vec<Vec<Vec<f64>>>)| -> Vec<f64> {
+            let of =
+                |block: &Block| Clock::ALL.iter().take(clocks).position(|clock| clock.stamps(block.kind)).unwrap_or(0);
+            let blocks = self.simulator.trials[*index].blocks.iter().map(of).enumerate();
+            blocks.map(|(row, clock)| scanned[clock][best[clock]][row]).collect()
+        };
+        let raw = self.chosen.iter().zip(&scanned).map(raw).collect();
+        (best.iter().zip(&grids).map(|(place, grid)| grid[*place]).collect(), raw)
+    }
+
+    /// Sets the clocks of a hypothesis to where what each stamps is explained best.
+    pub(crate) fn set_clocks(&self, hypothesis: &mut Hypothesis) {
+        if self.simulator.nominal.clocks() > 0 {
+            let (clocks, _) = self.with_best_clocks(hypothesis);
+            hypothesis.z[..clocks.len()].copy_from_slice(&clocks);
         }
     }
 
@@ -145,7 +166,7 @@ impl<'a> Study<'a> {
             for (error, size) in self.engine_errors.iter().zip(sizes) {
                 raw.axpy(*size, &error[place], 1.0);
             }
-            whitener.apply(raw).map(huber)
+            self.cells[place].transform(whitener.apply(raw)).map(huber)
         });
         Stack::new(white.collect(), self.cells.clone())
     }
@@ -166,33 +187,14 @@ impl<'a> Study<'a> {
             chosen: places.iter().map(|place| self.chosen[*place]).collect(),
             whiteners: places.iter().map(|place| self.whiteners[*place].clone()).collect(),
             cells: places.iter().map(|place| self.cells[*place].clone()).collect(),
-            times: self.times.clone(),
             engine_errors: (self.engine_errors.iter())
                 .map(|error| places.iter().map(|place| error[*place].clone()).collect())
                 .collect(),
         }
     }
 
-    /// Learns from simulations near `hypothesis` how large errors that last may be: those of the solver, and of the start; and how long the errors that
-    /// these do not explain last in each cell.
+    /// Learns from simulations near `hypothesis` how large errors that last may be: those of the solver, and of the start; and which residuals share a scale.
     pub fn learn_errors(&mut self, hypothesis: &Hypothesis) {
-        let (keys, raw) = self.learn_lasting(hypothesis);
-        let white = self.white(&raw, &[]);
-        let trials = self.chosen.iter().map(|index| &self.simulator.trials[*index]);
-        let episodes = trials.zip(&keys).zip(white.iter());
-        self.times = Times::of(episodes.map(|((trial, keys), white)| (&trial.blocks[..], &keys[..], white)));
-        self.cells = keys.iter().map(|keys| self.times.cells(keys)).collect();
-    }
-
-    /// The same with the times that another study has learnt: of episodes that are to judge a model.
-    pub fn learn_errors_as(&mut self, hypothesis: &Hypothesis, other: &Self) {
-        let (keys, _) = self.learn_lasting(hypothesis);
-        self.times = other.times.clone();
-        self.cells = keys.iter().map(|keys| self.times.cells(keys)).collect();
-    }
-
-    /// Keys of the blocks of each episode, and its residuals.
-    fn learn_lasting(&mut self, hypothesis: &Hypothesis) -> (Vec<Vec<Key>>, Vec<Vec<f64>>) {
         let simulate = |engine: &Engine, nudge| {
             self.charge();
             self.simulator.residuals(hypothesis, engine, nudge, &self.chosen)
@@ -219,7 +221,9 @@ impl<'a> Study<'a> {
             (0..self.chosen.len()).map(|place| Whitener::new(plain[place].len(), &columns(place))).collect();
         // The start is another in each episode; the engine is the same in all, whatever else its errors do to a single one.
         self.engine_errors = engine_errors;
-        (keys, plain)
+        let cells =
+            |(index, keys): (&usize, &Vec<Key>)| Arc::new(Cells::new(&self.simulator.trials[*index].blocks, keys));
+        self.cells = self.chosen.iter().zip(&keys).map(cells).collect();
     }
 
     /// Starts from which a right model's answers should not differ, with the standard deviation of the error in such differences.

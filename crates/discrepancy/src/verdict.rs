@@ -1,22 +1,12 @@
 //! What to call it, and which model to keep: an effect, nothing, or something that the catalogue has not.
-//!
-//! Where the search has accepted effects that leave no more than noise, the model of the log is right, and ln evidences say how sure the names are. They are divided by
-//! a temperature, because errors of the engine are alike in many readings. Everywhere else something is left that our contacts do not explain, and
-//! evidences say too much: then a [`Decision`] that was learnt from logs of other engines says how probable an effect, nothing and something else are.
 
 use crate::decision::{Decision, Probabilities};
 use crate::findings::Findings;
 use crate::fit::Fit;
 use crate::likelihood::NOISE_FLOOR;
+use crate::model::Model;
 use crate::report::Verdict;
 use crate::rival::Round;
-
-/// Mean square of held-out residuals below which they are noise.
-const NOISE: f64 = 1.4;
-
-/// What a further effect gains, as a share of what those before it did, that errors of the engine make of nothing: ln evidence of it over nothing is divided by this.
-/// Of seeds 17 to 20 of the benchmark ten further names of single effects that were wrong gained 0.6 to 13 %, 57 right ones of pairs 1.5 % and more, 17 of them less than 10 %.
-const SECOND_ERROR: f64 = 0.03;
 
 /// An unknown gap is shown with the nearest effect if that is right with this probability or more.
 const WORTH_TELLING: f64 = 0.2;
@@ -30,197 +20,141 @@ pub(crate) fn closed_fraction(before: f64, after: f64) -> f64 {
 #[derive(Clone, Debug)]
 pub(crate) struct Decided {
     pub(crate) verdict: Verdict,
-    /// Of the best effect.
+    /// Of the effects that were compared for the first place, of nothing and of something else.
     pub(crate) probabilities: Probabilities,
     /// That each effect of the model is right.
     pub(crate) confidences: Vec<f64>,
     /// The model to keep.
     pub(crate) model: Fit,
+    /// Whether that was fitted to the episodes of the screening alone.
+    pub(crate) in_part: bool,
     /// Why it is `unknown`.
     pub(crate) reason: Option<String>,
 }
 
-/// Decides from what a search accepted and compared. `findings`: what speaks for the first rival of each round, the first of which stands for the log.
-pub(crate) fn decide(
-    decision: &Decision,
-    temperature: f64,
-    accepted: Fit,
-    rounds: &[Round],
-    findings: &[Findings],
-) -> Decided {
-    if !accepted.model.parts.is_empty() && findings.iter().any(|found| found.after < NOISE) {
-        return by_evidence(temperature, accepted, rounds);
-    }
-    by_probabilities(decision, accepted, rounds, findings)
-}
-
-/// Names all that was accepted, as surely as tempered evidences say.
-fn by_evidence(temperature: f64, accepted: Fit, rounds: &[Round]) -> Decided {
-    let mut explained = 0.0;
-    let confidences: Vec<f64> = (rounds.iter().take(accepted.model.parts.len()))
-        .map(|round| {
-            let gain = round.rivals.first().map_or(0.0, |first| first.gain);
-            let noise = temperature.max(SECOND_ERROR * explained);
-            explained += gain;
-            let passed = round.passed_over().into_iter().map(|(_, more)| gain + more);
-            let others = round.rivals.iter().skip(1).map(|rival| rival.gain).chain(passed);
-            confidence(gain, others, temperature, noise)
-        })
-        .collect();
-    let effect = confidences.first().copied().unwrap_or(0.0);
-    Decided {
-        verdict: Verdict::Effect,
-        probabilities: Probabilities { effect, none: 0.0, unknown: 1.0 - effect },
-        confidences,
-        model: accepted,
-        reason: None,
-    }
-}
-
-/// Probability of what gains so much among its rivals, of these gains, and nothing; equal prior odds, ln evidences divided by the temperature, those over
-/// nothing by `noise`.
-fn confidence(gain: f64, others: impl Iterator<Item = f64>, temperature: f64, noise: f64) -> f64 {
-    let odds = |other: f64| ((other - gain) / temperature).exp();
-    1.0 / (1.0 + others.map(odds).sum::<f64>() + (-gain / noise).exp())
-}
-
-fn by_probabilities(decision: &Decision, accepted: Fit, rounds: &[Round], findings: &[Findings]) -> Decided {
-    let each: Vec<Probabilities> = findings.iter().map(|findings| decision.probabilities(findings)).collect();
-    let probabilities = each[0];
+/// Decides from what a search accepted and compared. `findings`: what speaks for the rivals of each round, the first of which stands for the log.
+pub(crate) fn decide(decision: &Decision, accepted: Fit, rounds: &[Round], findings: &[Vec<Findings>]) -> Decided {
+    let each: Vec<Probabilities> = findings.iter().map(|round| decision.probabilities(round)).collect();
+    let probabilities = each[0].clone();
     let verdict = probabilities.verdict();
-    let null = || rounds[0].base.clone();
+    let (name, probability) = probabilities.best();
     let told = match verdict {
         Verdict::Effect => true,
-        Verdict::Unknown => probabilities.effect >= WORTH_TELLING,
+        Verdict::Unknown => probability >= WORTH_TELLING,
         Verdict::None => false,
     };
-    let lead = rounds[0].rivals.first().filter(|rival| rival.whole).map(|rival| rival.fit.clone());
-    let mut model = match (told, accepted.model.parts.is_empty()) {
-        (false, _) => null(),
-        (true, false) => accepted,
-        (true, true) => lead.unwrap_or_else(null),
+    let (mut model, in_part) = match rounds[0].rival(name) {
+        Some(_) if told && has(&accepted.model, name) => (accepted, false),
+        Some(rival) if told => (rival.fit.clone(), !rival.whole),
+        _ => (rounds[0].base.clone(), false),
     };
-    // A further effect is named if it is more probable right than not; several that were found at once stand or fall together.
-    let doubted = |place: usize| each.get(place).is_some_and(|further| further.effect <= 0.5);
-    if model.model.parts.len() == 2 && doubted(1) && rounds.len() > 1 && !rounds[1].base.model.parts.is_empty() {
-        model = rounds[1].base.clone();
+    // A further effect is named by the rule of the first; several that were found at once stand or fall together.
+    let further = |model: &Fit, place: usize| -> Option<f64> {
+        Some(each.get(place)?.of(model.model.parts.get(place)?.kind().name()))
+    };
+    if model.model.parts.len() == 2
+        && each.get(1).is_some_and(|second| second.verdict() != Verdict::Effect)
+        && let Some(second) = rounds.get(1).filter(|round| has(&round.base.model, name))
+    {
+        model = second.base.clone();
     }
-    let confidence = |place: usize| each.get(place).map_or(probabilities.effect, |found| found.effect);
+    let confidence = |place: usize| match place {
+        0 => probabilities.of(model.model.parts[0].kind().name()).max(probability),
+        _ => further(&model, place).unwrap_or(probability),
+    };
     let confidences: Vec<f64> = (0..model.model.parts.len()).map(confidence).collect();
     let reason = (verdict == Verdict::Unknown).then(|| {
+        let best = if name.is_empty() { "none that was tried".to_string() } else { format!("{name}, the best that was tried, with {probability:.2}") };
         format!(
-            "noise and contacts alone explain this log with probability {:.2}, the best effect that was tried ({}) with {:.2}",
-            probabilities.none, findings[0].effect, probabilities.effect
+            "noise and contacts alone explain this log with probability {:.2}, an effect of the catalogue with {:.2} ({best})",
+            probabilities.none,
+            probabilities.effect()
         )
     });
-    Decided { verdict, probabilities, confidences, model, reason }
+    Decided { verdict, probabilities, confidences, model, in_part, reason }
+}
+
+fn has(model: &Model, name: &str) -> bool {
+    model.parts.iter().any(|part| part.kind().name() == name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::candidate::{candidates, tests::context};
+    use crate::decision::tests::{by_evidence, findings};
     use crate::likelihood::Stack;
-    use crate::model::Model;
     use crate::rival::{Heldout, Rival};
 
-    fn fit(effects: usize) -> Fit {
+    /// With the first effects of the catalogue from `first` on.
+    fn fit(first: usize, effects: usize) -> Fit {
         let all = candidates(&context());
-        let model = all.iter().take(effects).fold(Model::nominal(0, 0), |model, candidate| model.with(candidate));
+        let chosen = all.iter().skip(first).take(effects);
+        let model = chosen.fold(Model::nominal(0, 0), |model, candidate| model.with(candidate));
         Fit::new(model, Vec::new(), Vec::new(), Stack::default(), Vec::new())
     }
 
-    /// A round that adds an effect to `base` others.
+    fn rival(fit: Fit, whole: bool) -> Rival {
+        Rival { fit, whole, gain: 1.0, heldout: Heldout::default() }
+    }
+
+    /// A round that adds an effect to `base` others, the first ones.
     fn round(base: usize) -> Round {
-        let rival = Rival { fit: fit(base + 1), whole: true, gain: 1.0, heldout: Heldout::default() };
         let (before, passed_over, promises) = (Heldout::default(), Vec::new(), Vec::new());
-        Round { promises, rivals: vec![rival], passed_over, base: fit(base), before, hasty: false }
+        let rivals = vec![rival(fit(0, base + 1), true)];
+        Round { promises, rivals, passed_over, base: fit(0, base), before, hasty: false }
     }
 
-    #[test]
-    fn confidence_is_a_tempered_probability() {
-        // Alone with nothing, 10 ahead: odds of e² to 1; a rival beside it as good halves it.
-        let two = 2.0_f64.exp();
-        assert!((confidence(10.0, [].into_iter(), 5.0, 5.0) - two / (two + 1.0)).abs() < 1e-12);
-        assert!((confidence(1e4, [1e4].into_iter(), 5.0, 5.0) - 0.5).abs() < 1e-12);
-        assert!((confidence(1e4, [1e4 - 5.0 * 3.0_f64.ln()].into_iter(), 5.0, 5.0) - 0.75).abs() < 1e-9);
-        // Beside something that gained 10 000 a gain of 200 may be an error of the engine.
-        assert!((confidence(200.0, [].into_iter(), 5.0, 300.0) - 0.66).abs() < 0.01);
+    fn name(place: usize) -> String {
+        fit(place, 1).model.parts[0].kind().name().into()
     }
 
-    #[test]
-    fn what_was_accepted_and_leaves_noise_is_named_by_its_evidence() {
-        let unknown = decision([-50.0, 50.0]);
-        let noise = Findings { after: 1.0, ..findings(0.0) };
-        let named = decide(&unknown, 5.0, fit(1), &[round(0)], &[noise.clone()]);
-        assert_eq!((named.verdict, named.model.model.parts.len()), (Verdict::Effect, 1));
-        // e^0.2 to 1.
-        assert!((named.confidences[0] - 0.55).abs() < 0.01, "{:?}", named.confidences);
-        // Where nothing was accepted, or more than noise is left, the decision speaks.
-        assert_eq!(decide(&unknown, 5.0, fit(0), &[round(0)], &[noise]).verdict, Verdict::Unknown);
-        assert_eq!(decide(&unknown, 5.0, fit(1), &[round(0)], &[findings(0.0)]).verdict, Verdict::Unknown);
-    }
-
-    /// Findings with this ln evidence, of which the decision below reads the probability of an effect.
-    fn findings(log_evidence: f64) -> Findings {
-        Findings {
-            effect: "table_tilt".into(),
-            log_evidence,
-            margin: 0.0,
-            steadiness: 0.0,
-            heldout_steadiness: 0.0,
-            drop: 0.0,
-            before: 9.0,
-            after: 9.0,
-            motion_after: 1.0,
-            force_after: 1.0,
-            motion_share: [0.0; 2],
-            force_share: [0.0; 2],
-            size: 1.0,
-            episodes: [20, 4],
-        }
-    }
-
-    /// Odds of an effect against `other` that are one plus the ln evidence.
-    fn decision(other: [f64; 2]) -> Decision {
-        let names = crate::decision::FEATURES;
-        let weights = |first: f64| [vec![first], vec![0.0; names.len() - 1]].concat();
-        let [none, unknown] = other.map(|offset| (offset, weights(0.0)));
-        Decision {
-            provenance: serde_json::Value::Null,
-            features: names.iter().map(|name| ((*name).to_string(), 0.0, 1.0)).collect(),
-            classes: [(0.0, weights(1.0)), none, unknown],
-        }
+    fn found(place: usize, log_evidence: f64) -> Findings {
+        findings(&name(place), log_evidence)
     }
 
     #[test]
     fn what_is_more_probable_than_not_is_named_whatever_the_search_accepted() {
-        let none = decision([0.0, -50.0]);
-        let named = decide(&none, 5.0, fit(0), &[round(0)], &[findings(8.0)]);
-        assert_eq!((named.verdict, named.model.model.parts.len()), (Verdict::Effect, 1));
+        let none = by_evidence([0.0, -50.0]);
+        let named = decide(&none, fit(0, 0), &[round(0)], &[vec![found(0, 8.0)]]);
+        assert_eq!((named.verdict, named.model.model.parts.len(), named.in_part), (Verdict::Effect, 1, false));
         assert!((named.confidences[0] - 0.9).abs() < 1e-9);
         // What the search accepted is taken back where nothing is missing.
-        let kept = decide(&none, 5.0, fit(1), &[round(0)], &[findings(0.0)]);
+        let kept = decide(&none, fit(0, 1), &[round(0)], &[vec![found(0, 0.0)]]);
         assert_eq!((kept.verdict, kept.model.model.parts.len(), kept.reason), (Verdict::None, 0, None));
     }
 
     #[test]
-    fn an_unknown_gap_shows_an_effect_that_is_worth_telling() {
-        let unknown = decision([-50.0, 1.0]);
-        let near = decide(&unknown, 5.0, fit(1), &[round(0)], &[findings(0.0)]);
-        assert_eq!((near.verdict, near.model.model.parts.len()), (Verdict::Unknown, 1));
-        assert!(near.confidences[0] < 0.5 && near.reason.is_some());
-        let far = decide(&decision([-50.0, 3.0]), 5.0, fit(1), &[round(0)], &[findings(0.0)]);
-        assert_eq!((far.verdict, far.model.model.parts.len()), (Verdict::Unknown, 0));
+    fn what_is_named_need_not_be_what_the_search_took_first() {
+        let mut first = round(0);
+        let other = (1..).find(|place| name(*place) != name(0)).unwrap();
+        first.rivals.push(rival(fit(other, 1), false));
+        let compared = vec![found(0, 3.0), found(other, 80.0)];
+        let named = decide(&by_evidence([0.0, 0.0]), fit(0, 1), &[first], &[compared]);
+        assert_eq!(named.model.model.parts[0].kind().name(), name(other));
+        assert!(named.in_part && named.confidences[0] > 0.9, "{named:?}");
     }
 
     #[test]
-    fn a_further_effect_is_named_if_it_is_more_probable_right_than_not() {
-        let none = decision([0.0, -50.0]);
+    fn an_unknown_gap_shows_an_effect_that_is_worth_telling() {
+        let near = decide(&by_evidence([-50.0, 1.0]), fit(0, 1), &[round(0)], &[vec![found(0, 0.0)]]);
+        assert_eq!((near.verdict, near.model.model.parts.len()), (Verdict::Unknown, 1));
+        assert!(near.confidences[0] < 0.5 && near.reason.is_some());
+        let far = decide(&by_evidence([-50.0, 3.0]), fit(0, 1), &[round(0)], &[vec![found(0, 0.0)]]);
+        assert_eq!((far.verdict, far.model.model.parts.len()), (Verdict::Unknown, 0));
+        let nothing = decide(&by_evidence([-50.0, 3.0]), fit(0, 0), &[round(0)], &[vec![findings("", 0.0)]]);
+        assert_eq!((nothing.verdict, nothing.model.model.parts.len()), (Verdict::Unknown, 0));
+    }
+
+    #[test]
+    fn a_further_effect_is_named_where_it_is_more_probable_than_not_that_there_is_one() {
+        let none = by_evidence([0.0, -50.0]);
         let rounds = [round(0), round(1)];
-        let both = decide(&none, 5.0, fit(2), &rounds, &[findings(8.0), findings(4.0)]);
+        let second = fit(0, 2).model.parts[1].kind().name();
+        let of = |log_evidence| [vec![found(0, 8.0)], vec![findings(second, log_evidence)]];
+        let both = decide(&none, fit(0, 2), &rounds, &of(4.0));
         assert_eq!(both.confidences.len(), 2);
-        let one = decide(&none, 5.0, fit(2), &rounds, &[findings(8.0), findings(0.0)]);
+        let one = decide(&none, fit(0, 2), &rounds, &of(0.0));
         assert_eq!((one.verdict, one.model.model.parts.len()), (Verdict::Effect, 1));
     }
 }

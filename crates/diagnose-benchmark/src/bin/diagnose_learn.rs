@@ -6,7 +6,8 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
-use diagnose_benchmark::learn::{Example, Judged, judge, learn, leave_one_engine_out, read};
+use diagnose_benchmark::judge::{Judged, judge};
+use diagnose_benchmark::learn::{Example, learn, leave_one_engine_out, read};
 use discrepancy::decision::{Decision, Probabilities};
 use program::Failed;
 use serde::Serialize;
@@ -73,7 +74,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         None => leave_one_engine_out(&examples),
     };
     let of = |engine: &str| -> Vec<(&Example, Probabilities)> {
-        judged.iter().filter(|(example, _)| engine.is_empty() || example.truth.engine == engine).copied().collect()
+        judged.iter().filter(|(example, _)| engine.is_empty() || example.truth.engine == engine).cloned().collect()
     };
     let mut rows: Vec<(String, Judged)> = engines.iter().map(|engine| (engine.clone(), judge(&of(engine)))).collect();
     rows.push(("all".into(), judge(&of(""))));
@@ -145,23 +146,15 @@ fn provenance(arguments: &Arguments, examples: &[Example]) -> serde_json::Value 
 
 fn markdown(table: &Table) -> String {
     let mut text = String::from(
-        "| engine | logs | named, of effects that show | best effect is the hidden one | `none` called `none` | false alarm | outside called `unknown` | wrong and ≥ 0.9 sure | 90 % intervals cover | calibration error | episodes simulated | s |\n\
-         |---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "| engine | logs | named, of effects that show | `none` called `none` | false alarm | outside called `unknown` | wrong and ≥ 0.9 sure | 90 % intervals cover | calibration error | episodes simulated | s |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    let share = |part: u32, whole: u32| {
-        if whole == 0 {
-            return "–".to_string();
-        }
-        let [low, high] = wilson95(part, whole).map(|bound| 100.0 * bound);
-        format!("{part} of {whole} ({low:.0} to {high:.0} %)")
-    };
     for (engine, judged) in &table.engines {
         let _ = writeln!(
             text,
-            "| {engine} | {} | {} | {} | {} | {} | {} | {} | {} | {:.2} | {:.0} | {:.0} |",
+            "| {engine} | {} | {} | {} | {} | {} | {} | {} | {:.2} | {:.0} | {:.0} |",
             judged.logs,
             share(judged.effects[1], judged.effects[0]),
-            share(judged.first, judged.effects[0]),
             share(judged.none[1], judged.none[0]),
             share(judged.false_alarms, judged.none[0]),
             share(judged.outside[1], judged.outside[0]),
@@ -172,5 +165,28 @@ fn markdown(table: &Table) -> String {
             judged.seconds,
         );
     }
+    let Some((_, all)) = table.engines.last() else { return text };
+    text.push_str(
+        "\n| the effect changes the readings by, noise variances | logs | the search compares it | named |\n|---|---|---|---|\n",
+    );
+    for (size, [logs, compared, named]) in ["3 to 30", "30 to 300", "more"].iter().zip(&all.by_size) {
+        let _ = writeln!(text, "| {size} | {logs} | {} | {} |", share(*compared, *logs), share(*named, *logs));
+    }
+    text.push_str("\n| confidence in the most probable effect | logs | right |\n|---|---|---|\n");
+    for (mean, right, count) in &all.reliability {
+        let _ =
+            writeln!(text, "| {mean:.2} | {count} | {} |", share((right * f64::from(*count)).round() as u32, *count));
+    }
+    let _ =
+        writeln!(text, "\nOf {} logs with 11 episodes or fewer {} got a wrong and sure name.", all.few[0], all.few[1]);
     text
+}
+
+/// A share with its 95 % Wilson interval.
+fn share(part: u32, whole: u32) -> String {
+    if whole == 0 {
+        return "–".to_string();
+    }
+    let [low, high] = wilson95(part, whole).map(|bound| 100.0 * bound);
+    format!("{part} of {whole} ({low:.0} to {high:.0} %)")
 }
