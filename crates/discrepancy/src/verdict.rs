@@ -44,6 +44,8 @@ pub(crate) fn decide(decision: &Decision, accepted: Fit, rounds: &[Round], findi
         Verdict::None => false,
     };
     let (mut model, in_part) = match rounds[0].rival(name) {
+        // Several that were found at once hide each other: alone another one may look better.
+        _ if told && found_at_once(&accepted.model, rounds) => (accepted, false),
         Some(_) if told && has(&accepted.model, name) => (accepted, false),
         Some(rival) if told => (rival.fit.clone(), !rival.whole),
         _ => (rounds[0].base.clone(), false),
@@ -72,6 +74,11 @@ pub(crate) fn decide(decision: &Decision, accepted: Fit, rounds: &[Round], findi
         )
     });
     Decided { verdict, probabilities, confidences, model, in_part, reason }
+}
+
+/// Whether its effects were added to the nominal model together, not one to another.
+fn found_at_once(model: &Model, rounds: &[Round]) -> bool {
+    model.parts.len() > 1 && rounds.get(1).is_some_and(|second| second.base.model.parts.is_empty())
 }
 
 fn has(model: &Model, name: &str) -> bool {
