@@ -20,6 +20,10 @@ use crate::world::{pose, vector};
 pub(crate) const SOLE_GAP_M: f64 = 0.0003;
 /// Radius, m, of a support point.
 const SUPPORT_RADIUS_M: f64 = 0.002;
+/// Cosine of the angle between a body's axis and the vertical beyond which it lies on a side.
+const UPRIGHT: f64 = 0.5;
+/// Height of a body's centre above the table, in its largest half extent, below which it touches the table.
+const ON_TABLE: f64 = 1.1;
 /// Collision groups of the table and of support points, which touch nothing else.
 const TABLE: Group = Group::GROUP_1;
 const SUPPORT: Group = Group::GROUP_2;
@@ -105,6 +109,16 @@ impl BodySpec {
             edge_radius_m: 0.0,
             beyond: Beyond::default(),
         }
+    }
+
+    /// With rounded edges, and without support points where a body that begins on the table, whose top is at `table_m`, lies on a side: those of its sole would be bumps there.
+    pub(crate) fn lying(self, state: &BodyState, table_m: f64, edge_radius_m: f64) -> Self {
+        let axis = pose(state.position_m, state.orientation).rotation * Vector::Z;
+        let [a, b, c] = self.shape.half_extents_m(self.size_m);
+        let largest_m = a.max(b).max(c);
+        let on_table = state.position_m[2] - table_m < ON_TABLE * largest_m;
+        let support_share = self.support_share.filter(|_| !on_table || f64::from(axis.z).abs() > UPRIGHT);
+        Self { support_share, edge_radius_m, ..self }
     }
 
     /// Principal inertia, kg m², of a uniform solid about its centre, body axes.

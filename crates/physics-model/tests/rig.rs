@@ -106,6 +106,25 @@ fn a_steady_push_takes_mu_m_g_with_what_is_added() {
 }
 
 #[test]
+fn a_cylinder_on_its_side_slides_until_it_rolls_whatever_its_sole_bears_on() {
+    let (radius_m, height_m, speed_mps) = (0.03, 0.08, 0.3);
+    let shape = RigShape::Solid { shape: ObjectShape::Cylinder, size_m: [radius_m, height_m, 0.0] };
+    let plain = RigObject::new(shape, MASS_KG, MU);
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    // Its axis along y.
+    let mut from = moving([speed_mps, 0.0, 0.0], [0.0; 3]);
+    (from.position_m[2], from.orientation) = (radius_m, [half, 0.0, 0.0, half]);
+    let patch = effect(EffectKind::FrictionPatch, &[1e-6, 0.0, 0.0, 0.05]);
+    for (object, effects) in [(RigObject { on_points: true, ..plain.clone() }, &[][..]), (plain, &patch)] {
+        let last = free(&object, effects, from, 60).pop().unwrap().object;
+        // Friction takes a third of the speed of a solid cylinder: v = v₀ / (1 + I / (m r²)), I = m r² / 2.
+        close(last.linear_mps[0], speed_mps / 1.5, 0.01 * speed_mps);
+        close(last.angular_rps[1], last.linear_mps[0] / radius_m, 0.2);
+        close(last.position_m[2], radius_m, 1e-3);
+    }
+}
+
+#[test]
 fn the_pair_of_tool_and_object_has_its_own_friction() {
     // The ball rises along the face that it pushes, at 3 cm/s.
     let vertical = |friction, tool_slip_mps| {
