@@ -111,14 +111,15 @@ impl BodySpec {
         }
     }
 
-    /// With rounded edges, and without support points where a body that begins on the table, whose top is at `table_m`, lies on a side: those of its sole would be bumps there.
-    pub(crate) fn lying(self, state: &BodyState, table_m: f64, edge_radius_m: f64) -> Self {
+    /// The same for a body that begins like this over a table whose top is at `table_m`. One that lies on a side has no support points: those of its sole
+    /// would be bumps there.
+    fn beginning(self, state: &BodyState, table_m: f64) -> Self {
         let axis = pose(state.position_m, state.orientation).rotation * Vector::Z;
         let [a, b, c] = self.shape.half_extents_m(self.size_m);
         let largest_m = a.max(b).max(c);
         let on_table = state.position_m[2] - table_m < ON_TABLE * largest_m;
         let support_share = self.support_share.filter(|_| !on_table || f64::from(axis.z).abs() > UPRIGHT);
-        Self { support_share, edge_radius_m, ..self }
+        Self { support_share, ..self }
     }
 
     /// Principal inertia, kg m², of a uniform solid about its centre, body axes.
@@ -205,6 +206,7 @@ pub(crate) fn insert_body(
     spec: BodySpec,
     state: &BodyState,
 ) -> Body {
+    let spec = spec.beginning(state, config.table_height_m);
     let pose = pose(state.position_m, state.orientation);
     let mut builder = if movable {
         let angular = vector(state.angular_rps);

@@ -185,7 +185,7 @@ impl<'a> World<'a> {
             RigidBodyBuilder::fixed().translation(vector([0.0, 0.0, config.table_height_m])),
             material(ColliderBuilder::new(SharedShape::halfspace(Vector::Z)), TABLE_FRICTION, config),
         );
-        let spec = BodySpec::object(theta, support_share, beyond).lying(object, config.table_height_m, edge_radius_m);
+        let spec = BodySpec { edge_radius_m, ..BodySpec::object(theta, support_share, beyond) };
         let object = insert_body(&mut physics, config, BodyRole::Object, true, spec, object);
         let obstacle = theta.obstacle.as_ref().zip(obstacle).map(|(parameters, state)| {
             let movable = config.obstacle_mobility == ObstacleMobility::Movable;

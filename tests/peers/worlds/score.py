@@ -19,24 +19,13 @@ import statistics
 import subprocess
 import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+
+from mujoco_score import share  # noqa: E402
+
 SURE = 0.9
 SKEWED_S = 0.003
 DELAYS = {"pose_delay", "actuation_delay"}
-
-
-def wilson(hits, of):
-    """95 % score interval (Wilson 1927)."""
-    z, p = 1.959963984540054, hits / of
-    centre = (p + z * z / (2 * of)) / (1 + z * z / of)
-    half = z / (1 + z * z / of) * math.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
-    return max(0.0, centre - half), min(1.0, centre + half)
-
-
-def share(hits):
-    if not hits:
-        return "–"
-    low, high = wilson(sum(hits), len(hits))
-    return f"{100 * sum(hits) / len(hits):.0f} % ({sum(hits)}/{len(hits)}; {100 * low:.0f}–{100 * high:.0f})"
 
 
 def load(folders, answers):
