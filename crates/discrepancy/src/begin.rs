@@ -6,7 +6,7 @@ use physics_model::{EffectConfig, EffectKind};
 use crate::candidate::Candidate;
 use crate::fit::{Begin, Effort, Fit, cost, fit};
 use crate::model::Model;
-use crate::screen::Promise;
+use crate::screen::{Promise, Start};
 use crate::simulator::Hypothesis;
 use crate::study::Study;
 
@@ -131,6 +131,36 @@ pub(crate) fn promise_friction(part: &Study, base: &Fit, promises: &[Promise]) -
     }
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     promises
+}
+
+/// What was compared before promises what it gains where it was then: beside another effect the changes of a scan do not add up.
+pub(crate) fn promise_known(part: &Study, base: &Fit, mut promises: Vec<Promise>, known: &[Fit]) -> Vec<Promise> {
+    if base.model.parts.is_empty() {
+        return promises;
+    }
+    let mut variants = Vec::new();
+    for (candidate, own) in known.iter().filter_map(added) {
+        let Some(promise) = promises.iter_mut().find(|promise| promise.candidate == *candidate) else { continue };
+        if candidate.begin.is_some() || variants.contains(&candidate.variant()) {
+            continue;
+        }
+        variants.push(candidate.variant());
+        let x = [base.x.as_slice(), own].concat();
+        let gained = base.cost() - simulated(part, &base.model.with(candidate), x).cost;
+        let gain = gained * promise.episodes as f64 / part.chosen.len() as f64;
+        if gain > promise.gain {
+            promise.gain = gain;
+            promise.start = Some(Start { clocks: base.x[..base.model.clocks].to_vec(), own: own.to_vec() });
+        }
+    }
+    promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    promises
+}
+
+/// A fit's last effect, and its coordinates.
+fn added(fit: &Fit) -> Option<(&Candidate, &[f64])> {
+    let candidate = fit.model.parts.last()?;
+    Some((candidate, &fit.x[fit.x.len() - candidate.coordinates.len()..]))
 }
 
 /// Coordinates that were simulated.

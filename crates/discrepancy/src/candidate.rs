@@ -64,7 +64,7 @@ pub struct Context {
 }
 
 /// One coordinate of a candidate.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
     /// Index of the parameter in the effect.
     pub index: usize,
@@ -79,7 +79,7 @@ pub struct Coordinate {
 }
 
 /// An effect from a place to begin from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// The effect with neutral strengths and the starting values of the rest.
     pub base: EffectConfig,

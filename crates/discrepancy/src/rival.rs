@@ -74,6 +74,11 @@ impl Round {
         self.passed_over.iter().filter(|rival| self.rivals.iter().all(|found| found.kind() != rival.kind()))
     }
 
+    /// All that were compared.
+    pub(crate) fn fits(&self) -> Vec<Fit> {
+        self.rivals.iter().chain(&self.passed_over).map(|rival| rival.fit.clone()).collect()
+    }
+
     /// The rival of this name that gains most.
     pub(crate) fn rival(&self, name: &str) -> Option<&Rival> {
         let named = self.rivals.iter().chain(&self.passed_over).filter(|rival| rival.kind().name() == name);

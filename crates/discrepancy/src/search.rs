@@ -26,7 +26,7 @@ mod retune;
 const SECOND_SHARE: f64 = 0.01;
 const LEAST_SECOND_SHARE: f64 = 0.0025;
 /// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
-const NEAR: f64 = 60.0;
+pub(crate) const NEAR: f64 = 60.0;
 /// What keeps this share of what it promised in the episodes of the screening says what others would keep.
 const MOST_KEEP: f64 = 0.5;
 /// If an effect gains more than this in ln evidence of the episodes of the screening, a model without was no place to learn errors at.
@@ -109,7 +109,9 @@ impl Search<'_> {
         }
         links.truncate(1);
         while rounds.is_empty() || (accepted.model.parts.len() < settings.effects && within(self)) {
-            let mut round = self.round(screening, &accepted, links.pop());
+            let compared = rounds.last().map_or_else(Vec::new, Round::fits);
+            let known = links.pop().unwrap_or_else(|| self.beside(screening, &accepted, &compared));
+            let mut round = self.round(screening, &accepted, known);
             let mut found = settings.effects > 0 && self.choose(&mut round, episodes, explained);
             if !found && round.hasty {
                 if let Some(pair) = self.both(screening, &mut round, episodes) {
@@ -178,7 +180,8 @@ impl Search<'_> {
             return None;
         }
         let Rival { fit, gain, .. } = round.rivals[first].clone();
-        let mut second = self.round(screening, &fit, None);
+        let known = self.beside(screening, &fit, &round.fits());
+        let mut second = self.round(screening, &fit, known);
         if !self.choose(&mut second, episodes, gain) || !both_convince([round, &second], episodes, asked) {
             return None;
         }
@@ -269,7 +272,7 @@ impl Search<'_> {
     }
 
     /// Whether it is, and after it one to all episodes.
-    fn affords_both(&self, part: &Study, model: &Model) -> bool {
+    pub(crate) fn affords_both(&self, part: &Study, model: &Model) -> bool {
         let rollouts = part.rollouts() + self.study.rollouts();
         self.study.affords((model.simulated() + STEPS + 1) * rollouts + self.reserve)
     }
@@ -305,12 +308,18 @@ impl Search<'_> {
         promises
     }
 
-    /// Compares what could be added to `base`, which in the first round knows the episodes of the screening alone. `known`: what those say already.
-    fn round(&mut self, screening: &Screening, base: &Fit, known: Option<Link>) -> Round {
+    /// What the episodes of the screening say of what could be added to `base`, beside which `compared` was looked at before.
+    fn beside(&self, screening: &Screening, base: &Fit, compared: &[Fit]) -> Link {
+        if base.model.parts.is_empty() {
+            return self.link(screening, &self.part, base, compared);
+        }
+        self.link(screening, &self.study.part(&screening.places), &base.part(&screening.places), compared)
+    }
+
+    /// Compares in all episodes what could be added to `base`, which in the first round knows those of the screening alone. `link`: what these say.
+    fn round(&mut self, screening: &Screening, base: &Fit, link: Link) -> Round {
         let first = base.model.parts.is_empty();
-        let part = if first { self.part.clone() } else { self.study.part(&screening.places) };
-        let begin = if first { base.clone() } else { base.part(&screening.places) };
-        let Link { promises, mut quick, .. } = known.unwrap_or_else(|| self.link(screening, &part, &begin));
+        let Link { promises, mut quick, base: begin, .. } = link;
         let before = begin.log_evidence();
         let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
         let kinds = if first { self.settings.quick_fits } else { self.settings.fits };
@@ -320,7 +329,7 @@ impl Search<'_> {
         let without = base.log_evidence();
         let share = self.share(screening);
         // Where the best alone leaves much of the episodes of the screening, a second effect is the question, not by how much the first one leads.
-        let hasty = first && quick.first().is_some_and(|best| leaves_much(best, &part, self.settings));
+        let hasty = first && quick.first().is_some_and(|best| leaves_much(best, &self.part, self.settings));
         let effort = if hasty { Effort::Quick } else { Effort::Full };
         let fully = |quick: Fit| -> Rival {
             if !self.affords(&self.study, &quick.model) {
