@@ -34,7 +34,7 @@ fn bash_completes_verbs_and_options_behind_cargo_xtask_and_behind_an_alias() {
     for before in [&["xtask"][..], &["cargo", "xtask"]] {
         let complete = |words: &[&str]| completed(&script, &[before, words].concat());
         assert_eq!(complete(&["cal"]), ["calibrate"]);
-        assert_eq!(complete(&["diagnose-"]), ["diagnose-benchmark"]);
+        assert_eq!(complete(&["diagnose-"]), ["diagnose-benchmark", "diagnose-learn"]);
         // Options of programs, which the menu does not link.
         assert_eq!(complete(&["eval", "--tr"]), ["--trials"]);
         assert_eq!(complete(&["scenario", "ch"]), ["check"]);

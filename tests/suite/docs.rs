@@ -114,7 +114,7 @@ fn one_help(verb: &str, own: Option<&str>) -> String {
 }
 
 /// What the menu lists, without what this machine need not have.
-const VERBS: [&str; 15] = [
+const VERBS: [&str; 16] = [
     "doctor",
     "eval",
     "demo",
@@ -128,6 +128,7 @@ const VERBS: [&str; 15] = [
     "calibrate",
     "bench",
     "diagnose-benchmark",
+    "diagnose-learn",
     "completions",
     "docs",
 ];

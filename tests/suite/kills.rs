@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use end_to_end::{files, program, stderr};
+use end_to_end::{files, program, short_log, stderr};
 
 use crate::pipeline::trained;
 
@@ -138,7 +138,7 @@ fn eval_survives_kills() {
 
 #[test]
 fn diagnose_survives_kills() {
-    let arguments = "--measured tests/data/mujoco-logs/logs/set-003 --threads 1".into();
+    let arguments = format!("--measured {} --threads 1", short_log().display());
     Work { binary: "diagnose", arguments, kept: diagnosis }.survives();
 }
 

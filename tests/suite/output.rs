@@ -3,7 +3,7 @@
 use std::fs::OpenOptions;
 use std::process::{Command, Output, Stdio};
 
-use end_to_end::{program, skipped, stderr};
+use end_to_end::{program, short_log, skipped, stderr};
 
 use crate::pipeline::trained;
 
@@ -11,13 +11,13 @@ use crate::pipeline::trained;
 fn writers() -> Vec<(&'static str, String)> {
     let search = "--domain D4 --preset paper --quick --trials 2 --threads 2 --set planner.budget={transitions=120} \
                   --set belief.rejection.particles=30 --set belief.rejection.max_attempts=90 --methods no-rnn,heuristic";
-    let log = "--measured tests/data/mujoco-logs/logs/set-003 --threads 2";
+    let log = format!("--measured {} --threads 2", short_log().display());
     vec![
         ("datagen", "--transitions 4000 --shards 4 --set data.episode_actions=10".into()),
         ("train", format!("--epochs 2 --data {}", trained().data.display())),
         ("eval", search.into()),
         ("demo", "--quick --method heuristic".into()),
-        ("diagnose", log.into()),
+        ("diagnose", log),
         ("record-log", "--actions passive".into()),
     ]
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use end_to_end::{files, root, run, stderr};
+use end_to_end::{files, root, run, short_log, stderr};
 use tempfile::TempDir;
 
 use crate::bad_input::refused;
@@ -58,7 +58,7 @@ fn works() -> Vec<Work> {
     let once = |binary, arguments: &str| Work { again: false, ..work(binary, arguments) };
     vec![
         work("demo", "--domain D1 --quick --method heuristic"),
-        work("diagnose", "--measured tests/data/mujoco-logs/logs/set-003"),
+        work("diagnose", &format!("--measured {}", short_log().display())),
         work("datagen", "--transitions 200 --shards 2"),
         work("train", &format!("--epochs 1 --data {data}")),
         work("calibrate", &format!("--prior {prior} --data {}", held_out.display())),

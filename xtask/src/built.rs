@@ -21,7 +21,7 @@ fn package(binary: &str) -> &str {
         "eval" => "experiments",
         "demo" => "report",
         "import-log" => "measured-log",
-        "record-log" => "diagnose-benchmark",
+        "record-log" | "diagnose-learn" => "diagnose-benchmark",
         "diagnose" => "discrepancy",
         "docs" => "book",
         // Called like their packages.

@@ -10,7 +10,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Plan: how often does it succeed?", &["eval", "scenario"]),
     ("Diagnose a log of a robot", &["import-log", "record-log", "diagnose"]),
     ("Train a prior", &["datagen", "train", "calibrate"]),
-    ("Measure the project itself", &["bench", "diagnose-benchmark"]),
+    ("Measure the project itself", &["bench", "diagnose-benchmark", "diagnose-learn"]),
     ("Develop", &["docs", "ci", "completions"]),
 ];
 

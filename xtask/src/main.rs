@@ -55,6 +55,9 @@ enum Verb {
     /// Scores diagnose on generated logs whose hidden effect it cannot know.
     #[command(disable_help_flag = true)]
     DiagnoseBenchmark(Rest),
+    /// Learns how diagnose decides from logs of other engines, and judges it on the engine left out.
+    #[command(disable_help_flag = true)]
+    DiagnoseLearn(Rest),
     /// Measures time and accuracy, beside other programs where those are installed.
     #[command(disable_help_flag = true)]
     Bench(Rest),
@@ -103,6 +106,7 @@ fn main() -> ExitCode {
         Verb::RecordLog(rest) => become_program("record-log", &rest.arguments),
         Verb::Diagnose(rest) => become_program("diagnose", &rest.arguments),
         Verb::DiagnoseBenchmark(rest) => become_program("diagnose-benchmark", &rest.arguments),
+        Verb::DiagnoseLearn(rest) => become_program("diagnose-learn", &rest.arguments),
         Verb::Bench(rest) => become_program("bench", &rest.arguments),
         Verb::Scenario(rest) => become_program("scenario", &rest.arguments),
         Verb::Docs(rest) => become_program("docs", &rest.arguments),

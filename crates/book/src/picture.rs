@@ -96,6 +96,7 @@ fn setup_of(kind: EffectKind) -> Setup {
         K::ForceDrift => setup(&[-0.0017, 0.0, 0.0], Scene::Rest, V::Force),
         K::ForceGain => setup(&[1.25], STANDARD, V::Force),
         K::ForceLowPass => setup(&[0.08], STANDARD, V::Force),
+        K::ForceDelay => setup(&[0.1], STANDARD, V::Force),
         K::ForceSaturation => setup(&[1.0], STANDARD, V::Force),
         K::PoseOffset => setup(&[0.0, 0.02, 0.0], STANDARD, V::Above),
         K::PoseDelay => setup(&[0.1], STANDARD, V::Way),

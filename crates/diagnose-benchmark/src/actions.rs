@@ -114,6 +114,8 @@ pub struct Scene {
     pub tool_height_m: f64,
     /// From the object's centre to where the tool's centre touches it at most, m.
     pub touch_m: f64,
+    /// The same from which on they do not touch, whichever part of the tool leads.
+    pub clear_m: f64,
     /// The same along the object's own x axis.
     pub face_m: f64,
     /// Half the width of the object across the push, m.
@@ -196,7 +198,7 @@ fn push(scene: &Scene, place_m: [f64; 2], push: Push) -> Vec<[f64; 3]> {
     let at = |along: f64| {
         [place_m[0] + along * cos - aside_m * sin, place_m[1] + along * sin + aside_m * cos, scene.tool_height_m]
     };
-    let begin = -(scene.touch_m + 0.03);
+    let begin = -(scene.clear_m + 0.03);
     let mut path = Path::from(scene.period_secs, at(begin));
     path.wait(0.2);
     if creeps {
@@ -232,7 +234,7 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
     for index in 0..2 {
         // Back and forth in the air and at the object: what shows on reversal and where nothing touches.
         let place_m = [scene.centre_m[0] + 0.05 * draw(), scene.centre_m[1] + 0.05 * draw()];
-        let start = [place_m[0] - scene.touch_m - 0.05, place_m[1], scene.tool_height_m];
+        let start = [place_m[0] - scene.clear_m - 0.05, place_m[1], scene.tool_height_m];
         let mut path = Path::from(scene.period_secs, start);
         path.wait(0.2);
         for (dx, dy, dz) in [(-0.04, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.05, 0.03), (0.0, -0.05, 0.0), (0.0, 0.0, 0.0)]
@@ -252,7 +254,7 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
         let angle = f64::from(index) * std::f64::consts::FRAC_PI_2 + 0.3 * draw();
         let (sin, cos) = angle.sin_cos();
         let at = |along: f64| [place_m[0] + along * cos, place_m[1] + along * sin, scene.tool_height_m];
-        let mut path = Path::from(scene.period_secs, at(-(scene.touch_m + 0.03)));
+        let mut path = Path::from(scene.period_secs, at(-(scene.clear_m + 0.03)));
         path.wait(0.2);
         if !scene.rolls {
             creep(scene, &mut path, at);
@@ -264,7 +266,7 @@ pub fn designed(scene: &Scene, rng: &mut Rng) -> Vec<Script> {
     }
     for index in 0..2 {
         let place_m = [scene.centre_m[0] + 0.1 * draw(), scene.centre_m[1]];
-        let start = [place_m[0] - scene.touch_m - 0.1, place_m[1], scene.tool_height_m];
+        let start = [place_m[0] - scene.clear_m - 0.1, place_m[1], scene.tool_height_m];
         let mut path = Path::from(scene.period_secs, start);
         path.wait(0.6);
         let lift_m = [0.03, 0.08][index];

@@ -30,7 +30,7 @@ use crate::generate::{Actions, FRICTION, MASS_KG};
 #[must_use]
 pub fn identifiable(kind: EffectKind, actions: Actions) -> bool {
     use EffectKind as K;
-    kind != K::EdgeRounding
+    !matches!(kind, K::EdgeRounding | K::ContactCompliance)
         && (actions == Actions::Designed || !matches!(kind, K::ForceGain | K::ForceDrift | K::StaticFriction))
 }
 
@@ -100,7 +100,7 @@ pub fn effect(
         K::ArmCompliance => vec![1.0 / between(1.0 / 6000.0, 1.0 / 600.0)],
         K::ActuatorGain => vec![1.0 + sign * between(0.03, 0.2)],
         K::Backlash => vec![between(0.0005, 0.003)],
-        K::ActuationDelay | K::PoseDelay => vec![between(0.01, 0.1)],
+        K::ActuationDelay | K::PoseDelay | K::ForceDelay => vec![between(0.01, 0.1)],
         K::JointFriction => vec![between(0.03, 0.09), between(0.2, 0.5)],
         K::WristPayload => [vec![between(0.1, 1.5)], space(free(0.01, 0.05))].concat(),
         K::ForceBias => space(between(0.15, 1.7)),

@@ -110,6 +110,7 @@ impl SetSpec {
             period_secs: PERIOD_SECS,
             tool_height_m: table_m + self.shape.half_height_m(size_m).max(tool_m + 0.005).min(0.03),
             touch_m: reach_m + tool_m,
+            clear_m: reach_m + tool_m,
             face_m: if self.shape == ObjectShape::Box { 0.5 * size_m[0] } else { reach_m } + tool_m,
             rolls: self.shape == ObjectShape::Sphere,
             half_width_m: if self.shape == ObjectShape::Box { 0.03 } else { 0.7 * reach_m },

@@ -21,10 +21,13 @@
 //! ```
 
 pub mod actions;
+pub mod choice;
 pub mod draw;
 pub mod folder;
 pub mod gaussian_process;
 pub mod generate;
+pub mod judge;
+pub mod learn;
 pub mod plan;
 pub mod recording;
 pub mod rehearsal;

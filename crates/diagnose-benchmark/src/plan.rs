@@ -12,7 +12,7 @@ use crate::generate::{Actions, ENGINES, RobotName, SetSpec};
 use crate::unknown::Unknown;
 
 /// Version of the sets: another one for every change that makes other logs of the same options.
-pub const VERSION: u32 = 5;
+pub const VERSION: u32 = 6;
 
 /// What decides all logs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

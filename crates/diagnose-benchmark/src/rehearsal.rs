@@ -5,10 +5,11 @@
 
 use std::sync::Arc;
 
-use measured_log::{Header, Log, Noise, Number, Object, Robot, Shape, SplitConfig, Table};
+use measured_log::{Header, Log, Noise, Number, Object, Robot as Arm, Shape, SplitConfig, Table};
+use nalgebra::Vector3;
 use physics_model::config::WorldConfig;
 use physics_model::rig::{Rig, RigObject, RigShape, RigTool};
-use physics_model::robot::ToolShape;
+use physics_model::robot::{Robot, ToolShape};
 use physics_model::{EffectConfig, ObjectShape, ObjectTheta};
 use pomdp::{Purpose, Seed};
 use scenario::Problem;
@@ -41,6 +42,7 @@ pub fn record(problem: &Problem, actions: Actions, seed: Seed) -> Result<Log, Re
         period_secs: config.control_period_secs,
         tool_height_m: scenario.task.tool_start_m[2],
         touch_m: reach_m + tool_m,
+        clear_m: reach_m + reach_of_tool_m(problem.truth.robot()).max(tool_m),
         face_m: if object.shape == ObjectShape::Box { 0.5 * object.size_m[0] } else { reach_m } + tool_m,
         rolls: object.shape == ObjectShape::Sphere,
         half_width_m: if object.shape == ObjectShape::Box { 0.5 * object.size_m[1] } else { 0.7 * reach_m },
@@ -68,11 +70,25 @@ pub fn record(problem: &Problem, actions: Actions, seed: Seed) -> Result<Log, Re
     recording.log(header, scripts.iter().enumerate())
 }
 
+/// How far a tool reaches from its centre along the table, m. An open hand reaches farther than the first of its parts, with which it would begin in the object.
+fn reach_of_tool_m(robot: &Robot) -> f64 {
+    let turn = robot.tool_orientation();
+    let along = |point_m: [f64; 3]| {
+        let [x, y, _]: [f64; 3] = (turn * Vector3::from(point_m)).into();
+        x.hypot(y)
+    };
+    let reach = |shape: &ToolShape| match shape {
+        ToolShape::Ball { center_m, radius_m } => along(*center_m) + radius_m,
+        ToolShape::Capsule { a_m, b_m, radius_m } => along(*a_m).max(along(*b_m)) + radius_m,
+    };
+    robot.tool_shapes().iter().map(reach).fold(0.0, f64::max)
+}
+
 fn header(problem: &Problem, object: &ObjectTheta) -> Result<Header, RecordError> {
     let scenario = &problem.scenario;
     let robot = match scenario.robot.name.as_str() {
-        "sawyer" => Robot::Sawyer,
-        "jaco" => Robot::Jaco,
+        "sawyer" => Arm::Sawyer,
+        "jaco" => Arm::Jaco,
         name => return Err(RecordError::Scenario(format!("robot: expected sawyer or jaco, found {name}"))),
     };
     let (fixed, believed, noise) = (Number::Fixed, &scenario.distribution.object, &scenario.sensor.noise);

@@ -2,12 +2,10 @@
 
 use std::ops::Range;
 
-use nalgebra::DVector;
-
 use crate::fit::Fit;
 use crate::interval::{bootstrap, widen};
-use crate::likelihood::{NOISE_FLOOR, episode_cost};
-use crate::rival::{Rival, Round};
+use crate::likelihood::NOISE_FLOOR;
+use crate::rival::{Heldout, Rival, Round};
 
 /// Share of resamples in which a strength has to have the same sign.
 const SAME_SIGN: f64 = 0.95;
@@ -60,7 +58,7 @@ pub(crate) fn convinces(rival: &Rival, round: &Round, episodes: &Episodes, asked
 
 /// Whether a rival might convince beside a second effect that is missing: what that one does may well hit what was held out harder.
 pub(crate) fn may_convince(rival: &Rival, episodes: &Episodes, asked: Asked, seed: u64) -> bool {
-    rival.whole && rival.gain > asked.least && lasts(&rival.fit, &episodes.fitted, seed)
+    rival.whole && rival.gain.is_finite() && rival.gain > asked.least && lasts(&rival.fit, &episodes.fitted, seed)
 }
 
 /// Whether both effects of `second` convince together, beside the model that the first one was added to.
@@ -71,15 +69,15 @@ pub(crate) fn both_convince([first, second]: [&Round; 2], episodes: &Episodes, a
 }
 
 /// Whether what was held out is explained better than by another model, of which these are the sums of squares.
-pub(crate) fn better_heldout(found: &[f64], other: &[f64], episodes: &Episodes) -> bool {
-    heldout_gains(other, found, &episodes.counts).iter().sum::<f64>() > 0.0
+pub(crate) fn better_heldout(found: &Heldout, other: &Heldout) -> bool {
+    other.gains(found).iter().sum::<f64>() > 0.0
 }
 
 /// Whether each effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
 /// resamples, as wide as the intervals that are reported; and it is no error of the engine.
 pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
-    let mut samples = bootstrap(fit, groups, seed);
-    widen(&mut samples, fit);
+    let Some(mut samples) = bootstrap(fit, groups, seed) else { return false };
+    widen(&mut samples, fit, 0.0);
     let mut first = fit.model.tunables + fit.model.errors;
     !fit.model.parts.is_empty()
         && fit.model.parts.iter().all(|part| {
@@ -95,25 +93,12 @@ pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
         })
 }
 
-/// What each held-out piece gains in ln p from one model to another, by their sums of squares.
-pub(crate) fn heldout_gains(before: &[f64], after: &[f64], counts: &[usize]) -> Vec<f64> {
-    (before.iter().zip(after).zip(counts))
-        .map(|((before, after), count)| episode_cost(*before, *count) - episode_cost(*after, *count))
-        .collect()
-}
-
 /// Whether what was held out is explained no worse, and the effect shows in more than one episode, whether fitted or held out: an odd one names
 /// nothing.
 fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bool {
-    let heldout = heldout_gains(&round.before, &rival.heldout, &episodes.counts);
-    let cost = |residuals: &DVector<f64>| episode_cost(residuals.norm_squared(), residuals.len());
-    let fitted: Vec<f64> = round
-        .base
-        .residuals
-        .iter()
-        .zip(&rival.fit.residuals)
-        .map(|(before, after)| cost(before) - cost(after))
-        .collect();
+    let heldout = round.before.gains(&rival.heldout);
+    let [before, after] = [&round.base, &rival.fit].map(|fit| fit.residuals.costs());
+    let fitted: Vec<f64> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
     let of_episodes = |gains: &[f64], pieces: &[Range<usize>]| -> Vec<f64> {
         pieces.iter().map(|piece| gains[piece.clone()].iter().sum()).collect()
     };
@@ -130,7 +115,7 @@ fn agrees(rival: &Rival, round: &Round, episodes: &Episodes, asked: Asked) -> bo
         (asked.plain, asked.kept.then_some(KEPT))
     };
     let kept = least_kept.is_none_or(|share| heldout.iter().sum::<f64>() > share * expected);
-    let gap = round.before.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
+    let gap = round.before.squares.iter().sum::<f64>() > NOISE_FLOOR * episodes.counts.iter().sum::<usize>() as f64;
     let steady = !asked.steady || (gap && gains.iter().sum::<f64>() > STEADY * standard_error_of_sum(&gains));
     steady && kept && heldout.iter().sum::<f64>() > -slack && gains.iter().sum::<f64>() - most > 0.5 * least
 }
@@ -144,18 +129,27 @@ fn standard_error_of_sum(gains: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DVector;
+
     use super::*;
+    use crate::likelihood::episode_cost;
     use crate::model::Model;
 
     /// A fit that leaves residuals of this size in each of four episodes.
     fn leaves(size: f64) -> Fit {
-        let residuals = vec![DVector::from_element(20, size); 4];
-        Fit { model: Model::nominal(0, 0), x: Vec::new(), raw: Vec::new(), residuals, jacobian: Vec::new() }
+        let residuals = vec![DVector::from_element(20, size); 4].into();
+        Fit::new(Model::nominal(0, 0), Vec::new(), Vec::new(), residuals, Vec::new())
+    }
+
+    /// Two held-out episodes with residuals of this size.
+    fn left_of(size: f64) -> Heldout {
+        let square = 20.0 * size * size;
+        Heldout { squares: vec![square; 2], costs: vec![episode_cost(square, 20); 2] }
     }
 
     /// A round that finds `found` beside `base` in what was fitted, and as much in two held-out episodes.
     fn round(base: f64, found: f64) -> Round {
-        let heldout = |size: f64| vec![20.0 * size * size; 2];
+        let heldout = left_of;
         let rival = Rival {
             gain: leaves(found).log_evidence() - leaves(base).log_evidence(),
             heldout: heldout(found),
@@ -180,7 +174,7 @@ mod tests {
         assert!(both_convince([&round(3.0, 2.5), &round(2.5, 1.0)], &episodes, asked));
         // Held-out episodes that the first one spoilt and the second does not mend.
         let mut second = round(2.5, 1.0);
-        second.rivals[0].heldout = vec![20.0 * 9.0; 2];
+        second.rivals[0].heldout = left_of(3.0);
         assert!(!both_convince([&round(3.0, 2.5), &second], &episodes, asked));
     }
 
@@ -195,7 +189,7 @@ mod tests {
         };
         assert!(agrees(&round, 2.0 * gain) && agrees(&round, 0.5 * gain));
         // Held-out episodes that gain a third as much each: enough for what is plain.
-        round.rivals[0].heldout = vec![20.0 * 1.33 * 1.33; 2];
+        round.rivals[0].heldout = left_of(1.33);
         assert!(!agrees(&round, 2.0 * gain) && agrees(&round, 0.5 * gain));
     }
 
@@ -204,8 +198,10 @@ mod tests {
         let pieces = |count: usize| (0..count).map(|place| place..place + 1).collect();
         let episodes = Episodes { fitted: pieces(4), heldout: pieces(2), counts: vec![20; 2] };
         let mut round = round(3.0, 3.0);
-        round.rivals[0].fit.residuals[0] = DVector::from_element(20, 0.5);
-        round.rivals[0].fit.residuals[1] = DVector::from_element(20, 2.5);
+        let mut residuals = leaves(3.0).residuals;
+        residuals[0] = DVector::from_element(20, 0.5);
+        residuals[1] = DVector::from_element(20, 2.5);
+        round.rivals[0].fit = Fit::new(Model::nominal(0, 0), Vec::new(), Vec::new(), residuals, Vec::new());
         // 42 of the 47 it gains are of one episode.
         let gain = round.rivals[0].fit.log_evidence() - round.base.log_evidence();
         round.rivals[0].gain = gain;

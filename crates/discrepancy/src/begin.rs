@@ -6,7 +6,7 @@ use physics_model::{EffectConfig, EffectKind};
 use crate::candidate::Candidate;
 use crate::fit::{Begin, Effort, Fit, cost, fit};
 use crate::model::Model;
-use crate::screen::Promise;
+use crate::screen::{Promise, Start};
 use crate::simulator::Hypothesis;
 use crate::study::Study;
 
@@ -42,22 +42,26 @@ pub(crate) fn shake(part: &Study, best: &mut Fit) {
 }
 
 /// Pairs of effects that do nearly the same: what one does at some strength, the other does at another.
-const TWINS: [[EffectKind; 2]; 6] = [
+const TWINS: [[EffectKind; 2]; 9] = [
     [EffectKind::TableTilt, EffectKind::ConstantForce],
+    [EffectKind::Tether, EffectKind::TableTilt],
+    [EffectKind::Tether, EffectKind::ConstantForce],
     [EffectKind::ViscousDamping, EffectKind::QuadraticDrag],
     [EffectKind::ForceBias, EffectKind::WristPayload],
     [EffectKind::PoseScale, EffectKind::TimeBase],
     [EffectKind::PoseDelay, EffectKind::ActuationDelay],
+    [EffectKind::ForceDelay, EffectKind::ForceLowPass],
     [EffectKind::FrictionLevel, EffectKind::ForceGain],
 ];
 
-/// Fits `other` anew from where its last effect does what that of `best` does, if that is better than where it is.
-pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
-    let (Some(found), Some(candidate)) = (best.model.parts.last(), other.model.parts.last()) else { return };
-    let kinds = [found.kind(), candidate.kind()];
-    if !TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]]) {
-        return;
-    }
+/// Whether two kinds of effects do nearly the same.
+pub(crate) fn are_twins(kinds: [EffectKind; 2]) -> bool {
+    TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]])
+}
+
+/// −ln posterior where the last effect of `model` does what that of `best` does, its twin, and a fit can begin.
+pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Begin)> {
+    let (found, candidate) = (best.model.parts.last()?, model.parts.last()?);
     let (shared, own) = best.x.split_at(best.x.len() - found.coordinates.len());
     let z = &shared[..best.model.tunables];
     let begin = match (found.effect(own), candidate.kind()) {
@@ -70,26 +74,25 @@ pub(crate) fn follow(part: &Study, best: &Fit, other: &mut Fit) {
             let weight_n = weight_n(part, z);
             candidate.coordinates_of(&[tilt.slope_x_rad * weight_n, tilt.slope_y_rad * weight_n])
         }
-        _ => match translate(part, z, (found, own), candidate) {
-            Some(begin) => begin,
-            None => return,
-        },
+        // What the spring pulls with where objects begin.
+        (EffectConfig::Tether(tether), EffectKind::ConstantForce | EffectKind::TableTilt) => {
+            let starts = part.chosen.iter().map(|index| part.simulator.trials[*index].start.position_m);
+            let n = part.chosen.len().max(1) as f64;
+            let [x, y] = starts.fold([0.0; 2], |[x, y], start| [x + start[0] / n, y + start[1] / n]);
+            let pull = [x - tether.anchor_x_m, y - tether.anchor_y_m].map(|off| -tether.stiffness_npm * off);
+            let weight_n = if candidate.kind() == EffectKind::TableTilt { weight_n(part, z) } else { 1.0 };
+            candidate.coordinates_of(&pull.map(|force_n| force_n / weight_n))
+        }
+        _ => translate(part, z, (found, own), candidate)?,
     };
     let at = |share: f64| {
         let own = begin.iter().zip(&candidate.coordinates).map(|(a, c)| (share * a).clamp(c.range[0], c.range[1]));
         let x: Vec<f64> = shared.iter().copied().chain(own).collect();
-        let raw = part.raw(&other.model.hypothesis(&x));
-        let cost = cost(&x, &part.white(&raw, other.model.engine_errors(&x)));
+        let raw = part.raw(&model.hypothesis(&x));
+        let cost = cost(&x, &part.white(&raw, model.engine_errors(&x)));
         (cost, Begin { x, raw: Some(raw), jacobian: Vec::new() })
     };
-    let begins = [1.0, 1.5, 2.25].map(at);
-    let Some((cost, begin)) = begins.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
-    if cost < other.cost() {
-        let again = fit(part, other.model.clone(), begin, Effort::Quick);
-        if again.log_evidence() > other.log_evidence() {
-            *other = again;
-        }
-    }
+    [1.0, 1.5, 2.25].map(at).into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// Weight of the object, N.
@@ -130,6 +133,36 @@ pub(crate) fn promise_friction(part: &Study, base: &Fit, promises: &[Promise]) -
     promises
 }
 
+/// What was compared before promises what it gains where it was then: beside another effect the changes of a scan do not add up.
+pub(crate) fn promise_known(part: &Study, base: &Fit, mut promises: Vec<Promise>, known: &[Fit]) -> Vec<Promise> {
+    if base.model.parts.is_empty() {
+        return promises;
+    }
+    let mut variants = Vec::new();
+    for (candidate, own) in known.iter().filter_map(added) {
+        let Some(promise) = promises.iter_mut().find(|promise| promise.candidate == *candidate) else { continue };
+        if candidate.begin.is_some() || variants.contains(&candidate.variant()) {
+            continue;
+        }
+        variants.push(candidate.variant());
+        let x = [base.x.as_slice(), own].concat();
+        let gained = base.cost() - simulated(part, &base.model.with(candidate), x).cost;
+        let gain = gained * promise.episodes as f64 / part.chosen.len() as f64;
+        if gain > promise.gain {
+            promise.gain = gain;
+            promise.start = Some(Start { clocks: base.x[..base.model.clocks].to_vec(), own: own.to_vec() });
+        }
+    }
+    promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    promises
+}
+
+/// A fit's last effect, and its coordinates.
+fn added(fit: &Fit) -> Option<(&Candidate, &[f64])> {
+    let candidate = fit.model.parts.last()?;
+    Some((candidate, &fit.x[fit.x.len() - candidate.coordinates.len()..]))
+}
+
 /// Coordinates that were simulated.
 struct Place {
     cost: f64,
@@ -161,6 +194,17 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     };
     let good = |place: &Place| before - place.cost > 0.5 * promised;
     let mut tried: Vec<Place> = Vec::new();
+    // Without the effect nothing is lost: a fit goes from there as far as it finds.
+    let changes_nothing = promise.candidate.kind() != EffectKind::Restitution
+        && part.simulator.nominal.replaced_by(promise.candidate.kind()).next().is_none();
+    if promise.candidate.begin.is_none() && changes_nothing {
+        tried.push(Place { cost: before, x: at(0.0), raw: base.raw.clone() });
+    }
+    if let Some(start) = &promise.start {
+        let mut x = [base.x.as_slice(), &start.own].concat();
+        x[..start.clocks.len()].copy_from_slice(&start.clocks);
+        tried.push(simulated(x));
+    }
     // From a border, where a strength may have no more effect, a fit does not find back.
     let at_border = (promise.begin.iter().zip(&promise.candidate.coordinates))
         .any(|(a, coordinate)| coordinate.strength && *a != 0.0 && coordinate.range.contains(a));
@@ -181,7 +225,9 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
         tried.extend([whole, 0.4 * whole].map(|share| simulated(together(share))));
     }
     let clips = promise.candidate.kind() == EffectKind::ForceSaturation;
-    if clips || !tried.iter().any(good) {
+    // Every bounce more or less is a ridge, whatever a scan promises of one.
+    let bounces = promise.candidate.kind() == EffectKind::Restitution;
+    if clips || bounces || !tried.iter().any(good) {
         for own in promise.candidate.elsewhere() {
             tried.push(simulated(base.x.iter().chain(&own).copied().collect()));
             // What re-tuning moved far to do what a sensor does is back where it was without it.
@@ -194,8 +240,14 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     }
     tried.extend(friction_for_mass(part, base, &promise.candidate).map(simulated));
     let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
-    let Place { x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
-    Begin { x, raw: Some(raw), jacobian: base.jacobian.clone() }
+    let Place { mut x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
+    let mut jacobian = base.jacobian.clone();
+    // A clock that gives way is not skewed, and changes nothing.
+    for clock in part.simulator.nominal.replaced_by(promise.candidate.kind()) {
+        x[clock] = 0.0;
+        jacobian[clock].iter_mut().for_each(|episode| episode.fill(0.0));
+    }
+    Begin { x, raw: Some(raw), jacobian }
 }
 
 /// Coordinates at which `other` does roughly what `found` does at its coordinates `a`, beside the nominal model re-tuned to `z`; `None` where it

@@ -4,24 +4,17 @@
 //! stiffnesses and limits). Units are such that N(0, 1) covers what is plausible: the prior of a fit.
 
 use physics_model::config::WorldConfig;
-use physics_model::effect::parameter::{Parameter, Scale};
 use physics_model::effect::{EffectConfig, EffectKind};
 use physics_model::{ObjectShape, Theta};
 
 use crate::obstacle::Place;
 
+mod coordinate;
+
+use coordinate::coordinates;
+
 /// Of the distance from the neutral to the farthest plausible value: one standard deviation of the prior of a strength.
 const STRENGTH_SHARE: f64 = 1.0 / 1.5;
-/// How far from neutral, in units, a linear step is measured: far enough to stand out of the solver's grain.
-const REACH: f64 = 0.35;
-/// The same where what a strength does is far from linear.
-const FAR: f64 = 1.2;
-/// Natural frequency of a soft contact, in that of the model's.
-const SOFT: f64 = 0.5;
-/// Contacts softer by less than this factor are those of another engine. Of seeds 17 to 19 of the benchmark, whose logs come from contacts of 45 to 100 Hz,
-/// three logs without an effect were told 43, 46 and 94 Hz, where the model has 60: what made them has 45, 45 and 80. Of effects, of 20 to 32 Hz, 34 Hz at most was found.
-/// Of MuJoCo, whose contacts have about 130, five were told 139 to 315 Hz.
-const SOFTER: f64 = 1.65;
 /// A coefficient of restitution, where the model has none, below which contacts of another engine part as fast. Of 20 logs of arms (seed 30 of the benchmark) one
 /// without an effect was told 0.05.
 const LEAST_BOUNCE: f64 = 0.1;
@@ -33,9 +26,8 @@ const CLIPS: [f64; 4] = [1.0, 0.85, 0.7, 0.58];
 const BOUNCES: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7];
 /// Places of a patch that are tried.
 const PATCHES: usize = 6;
-/// Standard deviation of where something is, m, around the place that a fit begins from.
-const PLACE_M: f64 = 0.05;
-/// The same of a body in the way, which is seen to within a few millimetres; its radius is known twice as well.
+/// Standard deviation of where a body in the way is, m, around the place that a fit begins from: it is seen to within a few millimetres. Its radius is known
+/// twice as well.
 const OBSTACLE_M: f64 = 0.01;
 
 /// What is known of the log before any effect is tried.
@@ -53,6 +45,10 @@ pub struct Context {
     pub patches_m: Vec<Place>,
     /// Largest force that was read, N; 0 without a sensor.
     pub largest_force_n: f64,
+    /// The same of all but one in a hundred readings.
+    pub usual_force_n: f64,
+    /// Speed of the object, m/s, of all but one in twenty tenths of a second.
+    pub usual_speed_mps: f64,
     /// Whether there is a tool that is commanded.
     pub tool: bool,
     /// Whether the object is an outline that was extruded.
@@ -68,7 +64,7 @@ pub struct Context {
 }
 
 /// One coordinate of a candidate.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coordinate {
     /// Index of the parameter in the effect.
     pub index: usize,
@@ -83,7 +79,7 @@ pub struct Coordinate {
 }
 
 /// An effect from a place to begin from.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// The effect with neutral strengths and the starting values of the rest.
     pub base: EffectConfig,
@@ -91,8 +87,6 @@ pub struct Candidate {
     pub coordinates: Vec<Coordinate>,
     /// Coordinates that a fit starts from for what has no small version of itself (a body in the way); `None`: from 0.
     pub begin: Option<Vec<f64>>,
-    /// How far from neutral, in units, the screening measures what a strength does; the other way where this is beyond the range.
-    pub reach: f64,
 }
 
 impl Candidate {
@@ -146,9 +140,7 @@ impl Candidate {
     pub fn elsewhere(&self) -> Vec<Vec<f64>> {
         match self.kind() {
             // Every bounce more or less is a ridge; for the kind the stronger step alone asks.
-            EffectKind::Restitution if self.reach == FAR => {
-                BOUNCES.iter().map(|e| self.coordinates_of(&[*e])).collect()
-            }
+            EffectKind::Restitution => BOUNCES.iter().map(|e| self.coordinates_of(&[*e])).collect(),
             // What a round object, which slips off its tool, does is no multiple of what a slight anisotropy does, and every axis has its own valley.
             EffectKind::AnisotropicFriction => {
                 let axes = |a| (0..8).map(move |eighth| [a, f64::from(eighth) * std::f64::consts::FRAC_PI_8]);
@@ -161,14 +153,13 @@ impl Candidate {
         }
     }
 
-    /// Whether at coordinates `a` the effect is one of the engine's own errors (see [`crate::study`]): contacts of another engine are somewhat softer, or stiffer by
-    /// whatever their steps allow, as bodies are, and part a little faster where the model's do not bounce. That is no discovery; what is much softer, or bounces, is.
+    /// Whether at coordinates `a` the effect is one of the engine's own errors (see [`crate::study`]): contacts of another engine part a little faster where
+    /// the model's do not bounce. That is no discovery; what bounces is.
     pub(crate) fn is_engine_error(&self, a: &[f64]) -> bool {
         let Some(coordinate) = self.coordinates.first() else { return false };
         let origin = self.kind().parameters()[coordinate.index].scale.value(coordinate.origin);
         let value = self.effect(a).values()[coordinate.index];
         match self.kind() {
-            EffectKind::ContactCompliance => value * SOFTER > origin,
             EffectKind::Restitution => origin == 0.0 && value < LEAST_BOUNCE,
             _ => false,
         }
@@ -191,14 +182,20 @@ fn applies(kind: EffectKind, context: &Context) -> bool {
     use EffectKind as K;
     let sphere = context.theta.object.shape == ObjectShape::Sphere;
     match kind {
-        K::ForceBias | K::ForceDrift | K::ForceGain | K::ForceLowPass | K::ForceSaturation | K::WristPayload => {
-            context.forces
-        }
+        K::ForceBias
+        | K::ForceDrift
+        | K::ForceGain
+        | K::ForceLowPass
+        | K::ForceSaturation
+        | K::ForceDelay
+        | K::WristPayload => context.forces,
         K::JointFriction => context.joint_torques,
         K::Backlash => context.joints,
         K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion => context.tool,
         // What is thrown leaves its path wherever it meets the table: that says nothing of bodies.
         K::HiddenObstacle => context.tool,
+        // How stiff contacts are is re-tuned like a mass: engines differ by factors, and no log says what its contacts should be.
+        K::ContactCompliance => false,
         K::RollingResistance => sphere,
         K::PressureDistribution => !sphere,
         // What is pushed stays on its sole, whose size `pressure_distribution` has; of an outline the edges are its own.
@@ -215,7 +212,7 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
             values[*index] = *value;
         }
         let base = neutral.with_parameters(&values).unwrap_or_else(|_| neutral.clone());
-        Candidate { coordinates: coordinates(&base, context), base, begin: None, reach: REACH }
+        Candidate { coordinates: coordinates(&base, context), base, begin: None }
     };
     match kind {
         // Both harmonics of the direction, either sign: the amplitude has none.
@@ -238,20 +235,6 @@ fn of_kind(kind: EffectKind, context: &Context) -> Vec<Candidate> {
         }
         EffectKind::StribeckFriction => [0.02, 0.06].iter().map(|v| with(&[(1, *v)])).collect(),
         EffectKind::HiddenObstacle => obstacles(context),
-        // What a bounce or a soft contact changes is no multiple of what a slight one or a stiffer one does.
-        EffectKind::Restitution | EffectKind::Adhesion => {
-            [REACH, FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
-        }
-        // A few degrees or hundredths are millimetres to centimetres, pushes go another way, and a slight one says nothing of that.
-        EffectKind::PoseRotation | EffectKind::PoseScale => {
-            [REACH, FAR, -FAR].iter().map(|reach| Candidate { reach: *reach, ..with(&[]) }).collect()
-        }
-        EffectKind::ContactCompliance => {
-            let near = with(&[]);
-            let soft = with(&[(0, SOFT * neutral.values()[0])]);
-            let reach = near.coordinates_of(&soft.base.values())[0];
-            vec![Candidate { reach, ..near.clone() }, near]
-        }
         _ => vec![with(&[])],
     }
 }
@@ -285,70 +268,9 @@ fn obstacles(context: &Context) -> Vec<Candidate> {
             coordinates.push(unit(6, 0.6, [-1.5, 6.0]));
         }
         let begin = Some(vec![0.0; coordinates.len()]);
-        Candidate { base, coordinates, begin, reach: REACH }
+        Candidate { base, coordinates, begin }
     };
     context.obstacles_m.iter().flat_map(bodies).map(candidate).collect()
-}
-
-fn coordinates(base: &EffectConfig, context: &Context) -> Vec<Coordinate> {
-    let kind = base.kind();
-    let values = base.values();
-    kind.parameters()
-        .iter()
-        .enumerate()
-        .filter(|(index, _)| !left_alone(kind, *index, context))
-        .map(|(index, parameter)| coordinate(kind, index, parameter, values[index], context))
-        .collect()
-}
-
-/// What no log of this kind can say.
-fn left_alone(kind: EffectKind, index: usize, context: &Context) -> bool {
-    match kind {
-        // Where a payload's centre is shows in torques alone.
-        EffectKind::WristPayload => index > 0 && !(context.wrist_torques || context.joint_torques),
-        EffectKind::ContactCompliance => index == 1,
-        // What is pushed stays upright, where the height of its centre hardly shows; of a sphere it does, which stays where it is in the table's frame.
-        EffectKind::ComOffset => index == 2 && context.tool && context.theta.object.shape != ObjectShape::Sphere,
-        _ => false,
-    }
-}
-
-fn coordinate(kind: EffectKind, index: usize, parameter: &Parameter, value: f64, context: &Context) -> Coordinate {
-    let scale = parameter.scale;
-    let origin = scale.coordinate(value);
-    if !parameter.is_strength() {
-        let unit = match (kind, parameter.unit) {
-            (EffectKind::Tether, _) => 0.1,
-            (EffectKind::WristPayload, _) => 0.04,
-            (_, "m") if parameter.name.ends_with("radius_m") => 0.02,
-            (_, "m") => PLACE_M,
-            (_, "rad") => 0.4,
-            (_, "m/s") => 0.02,
-            _ => 0.5 * (parameter.plausible[1] - parameter.plausible[0]).abs(),
-        };
-        let ends = parameter.limits.map(|limit| (limit - origin) / unit);
-        return Coordinate { index, origin, unit, range: [ends[0].max(-5.0), ends[1].min(5.0)], strength: false };
-    }
-    let [low, high] = if kind == EffectKind::ForceSaturation {
-        // What was never reached clips nothing.
-        [0.3 * context.largest_force_n.max(0.1), f64::INFINITY]
-    } else {
-        parameter.plausible
-    };
-    let [a, b] = [scale.coordinate(low), scale.coordinate(high)];
-    let farthest = if (a - origin).abs() > (b - origin).abs() { a } else { b };
-    let unit = STRENGTH_SHARE * (farthest - origin).abs().max(1e-9);
-    // One that is plausible on one side alone is looked for there.
-    let (least, most) = (a.min(b), a.max(b));
-    let tolerance = 1e-9 * unit;
-    let below = if least < origin - tolerance { -4.0 } else { 0.0 };
-    let above = if most > origin + tolerance { 4.0 } else { 0.0 };
-    let [from, to] = match scale {
-        Scale::Linear => parameter.limits,
-        Scale::Reciprocal => [0.0, scale.coordinate(parameter.limits[0])],
-    };
-    let range = [((from - origin) / unit).max(below), ((to - origin) / unit).min(above)];
-    Coordinate { index, origin, unit, range, strength: true }
 }
 
 #[cfg(test)]
@@ -381,6 +303,8 @@ pub(crate) mod tests {
             obstacles_m: vec![([0.5, 0.1], 0.03)],
             patches_m: vec![([0.4, 0.1], 0.09)],
             largest_force_n: 10.0,
+            usual_force_n: 10.0,
+            usual_speed_mps: 0.2,
             tool: true,
             outline: false,
             forces: true,
@@ -391,12 +315,9 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn contacts_that_are_stiffer_or_a_little_softer_or_hardly_bounce_are_another_engines() {
+    fn contacts_that_hardly_bounce_are_another_engines_and_stiffness_is_no_effect() {
         let all = candidates(&context());
-        let soft = all.iter().find(|candidate| candidate.kind() == EffectKind::ContactCompliance).unwrap();
-        let engine = |frequency_hz: f64| soft.is_engine_error(&soft.coordinates_of(&[frequency_hz, 5.0]));
-        assert!(engine(60.0) && engine(45.0) && engine(94.0) && engine(200.0));
-        assert!(!engine(34.0) && !engine(20.0));
+        assert!(all.iter().all(|candidate| candidate.kind() != EffectKind::ContactCompliance));
         let bounce = all.iter().find(|candidate| candidate.kind() == EffectKind::Restitution).unwrap();
         let engine = |coefficient: f64| bounce.is_engine_error(&bounce.coordinates_of(&[coefficient]));
         assert!(engine(0.05) && !engine(0.15) && !engine(0.5));
@@ -413,27 +334,8 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn soft_contacts_are_looked_for_where_they_are_soft() {
+    fn bounces_are_tried_once() {
         let all = candidates(&context());
-        let of = |kind| all.iter().filter(move |candidate| candidate.kind() == kind);
-        let at_reach = |candidate: &Candidate| {
-            let a: Vec<f64> =
-                candidate.coordinates.iter().map(|c| if c.strength { candidate.reach } else { 0.0 }).collect();
-            candidate.effect(&a).values()[0]
-        };
-        let [soft, stiff] = of(EffectKind::ContactCompliance).map(at_reach).collect::<Vec<_>>()[..] else { panic!() };
-        assert!((soft - 30.0).abs() < 1e-9 && stiff > 60.0, "{soft} and {stiff} Hz, of 60");
-        let [little, much] = of(EffectKind::Restitution).map(at_reach).collect::<Vec<_>>()[..] else { panic!() };
-        assert!(little > 0.1 && little < 0.3 && much > 0.5 && much < 0.9, "{little} and {much}");
-    }
-
-    #[test]
-    fn frames_are_looked_at_from_far_and_bounces_are_tried_once() {
-        let all = candidates(&context());
-        for kind in [EffectKind::PoseRotation, EffectKind::PoseScale] {
-            let reaches: Vec<f64> = all.iter().filter(|c| c.kind() == kind).map(|c| c.reach).collect();
-            assert_eq!(reaches, [REACH, FAR, -FAR]);
-        }
         let bounces: Vec<_> = all.iter().filter(|c| c.kind() == EffectKind::Restitution).collect();
         let tried: Vec<_> = bounces.iter().flat_map(|c| c.elsewhere().into_iter().map(|a| c.effect(&a))).collect();
         let coefficients: Vec<f64> = tried.iter().map(|effect| effect.values()[0]).collect();
@@ -462,10 +364,10 @@ pub(crate) mod tests {
         let thrown = Context { tool: false, ..context() };
         let [pushed, thrown] = [context(), thrown].map(|context| candidates(&context));
         for kind in EffectKind::ALL {
-            let expected = !matches!(kind, K::RollingResistance | K::EdgeRounding);
+            let expected = !matches!(kind, K::RollingResistance | K::EdgeRounding | K::ContactCompliance);
             assert_eq!(pushed.iter().any(|c| c.kind() == *kind), expected, "{}", kind.name());
             let tools = matches!(kind, K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion);
-            let expected = !tools && !matches!(kind, K::RollingResistance | K::HiddenObstacle);
+            let expected = !tools && !matches!(kind, K::RollingResistance | K::HiddenObstacle | K::ContactCompliance);
             assert_eq!(thrown.iter().any(|c| c.kind() == *kind), expected, "{}, thrown", kind.name());
         }
         for candidate in pushed.iter().chain(&thrown) {

@@ -6,11 +6,12 @@
 //! episodes and has to convince there. If it does not, the last one is dropped.
 
 use crate::accept::{Episodes, convinces, lasts};
+use crate::begin::promise_known;
 use crate::fit::{Begin, Effort, Fit, STEPS, fit};
 use crate::model::Model;
-use crate::rival::{Rival, Round, first_of_each};
+use crate::rival::{Heldout, Rival, Round, first_of_each};
 use crate::screen::{Promise, Screening};
-use crate::search::{Search, added_kind};
+use crate::search::{NEAR, Search, added_kind};
 use crate::study::Study;
 
 /// So many effects make a chain. One alone is compared with its rivals in all episodes.
@@ -34,6 +35,8 @@ pub(crate) struct Link {
     pub(crate) base: Fit,
     /// Whether the first one is a link of a chain.
     pub(crate) holds: bool,
+    /// What the first one gains over the one in whose place it came when all links were known, in the episodes of the screening.
+    pub(crate) exchanged: f64,
 }
 
 impl Link {
@@ -50,7 +53,8 @@ impl Search<'_> {
         let (mut links, mut gained) = (Vec::new(), 0.0);
         // What is done with them in the end: to learn errors, and to fit the model without them.
         let simulations = self.study.simulations_to_learn();
-        self.reserve = simulations * (self.study.rollouts() + self.kept.rollouts())
+        self.reserve = simulations
+            * (self.study.rollouts() + self.kept.rollouts() + self.reported.as_ref().map_or(0, Study::rollouts))
             + (null.model.tunables + STEPS + 1) * self.study.rollouts();
         let (mut part, mut at) = (self.part.clone(), null.clone());
         while at.model.parts.len() < self.settings.effects && self.affords_one_more(&part, &at.model) {
@@ -59,7 +63,8 @@ impl Search<'_> {
                 part.learn_errors(&at.model.hypothesis(&at.x));
                 at = fit(&part, at.model, Begin::at(&at.x), Effort::Quick);
             }
-            let mut link = self.link(screening, &part, &at);
+            let known: Vec<Fit> = links.iter().rev().flat_map(|link: &Link| link.quick.iter().cloned()).collect();
+            let mut link = self.link(screening, &part, &at, &known);
             let gain = self.share(screening) * link.gain();
             let least = self.asked(gained).least;
             link.holds = gain > least && link.quick.first().is_some_and(|best| self.lasts_in(best, &part));
@@ -71,15 +76,54 @@ impl Search<'_> {
             }
             gained += gain;
         }
+        self.exchange_links(&part, &mut links);
         self.reserve = 0;
         links
     }
 
-    /// What could be added to `base`, which knows the episodes of the screening alone, as `part` does.
-    pub(crate) fn link(&self, screening: &Screening, part: &Study, base: &Fit) -> Link {
-        let promises = self.promises(screening, part, base);
+    /// Puts near rivals in the places of links before the last one: what was compared while others hid is compared again where all are known.
+    fn exchange_links(&self, part: &Study, links: &mut [Link]) {
+        let held = links.iter().filter(|link| link.holds).count();
+        if held < LEAST {
+            return;
+        }
+        let mut at = links[held - 1].quick[0].clone();
+        for place in 0..held - 1 {
+            let link = &links[place];
+            let lead = link.quick[0].log_evidence();
+            let near = |rival: &&Fit| {
+                added_kind(rival).is_some_and(|kind| at.model.parts.iter().all(|part| part.kind() != kind))
+                    && lead - rival.log_evidence() < NEAR
+            };
+            let rivals: Vec<(usize, &Fit)> = link.quick.iter().enumerate().filter(|(_, rival)| near(rival)).collect();
+            let mut best: Option<(usize, Fit)> = None;
+            for (index, rival) in rivals {
+                let Some((model, x)) = replaced(&at, place, rival) else { continue };
+                if !self.affords_both(part, &model) {
+                    break;
+                }
+                let fit = fit(part, model, Begin::at(&x), Effort::Quick);
+                let lead = best.as_ref().map_or(at.log_evidence(), |(_, best)| best.log_evidence());
+                if fit.log_evidence() > lead {
+                    best = Some((index, fit));
+                }
+            }
+            if let Some((index, fit)) = best {
+                links[place].exchanged =
+                    lead - links[place].quick[index].log_evidence() + fit.log_evidence() - at.log_evidence();
+                let rival = links[place].quick.remove(index);
+                links[place].quick.insert(0, rival);
+                links[held - 1].quick[0] = fit.clone();
+                at = fit;
+            }
+        }
+    }
+
+    /// What could be added to `base`, which knows the episodes of the screening alone, as `part` does. `known`: what was compared before.
+    pub(crate) fn link(&self, screening: &Screening, part: &Study, base: &Fit, known: &[Fit]) -> Link {
+        let promises = promise_known(part, base, self.promises(screening, part, base), known);
         let quick = self.quick(screening, part, base, &promises);
-        Link { promises, quick, base: base.clone(), holds: false }
+        Link { promises, quick, base: base.clone(), holds: false, exchanged: 0.0 }
     }
 
     /// Whether the budget suffices to look for an effect beside those of a model, and for what they come to together.
@@ -87,7 +131,7 @@ impl Search<'_> {
         let coordinates = model.simulated() + COORDINATES;
         let looked = KINDS * (coordinates + STEPS + 1) + part.simulations_to_learn();
         let fitted = (coordinates + STEPS + 1) * self.study.rollouts();
-        self.study.simulator.affords(looked * part.rollouts() + fitted + self.reserve)
+        self.study.affords(looked * part.rollouts() + fitted + self.reserve)
     }
 
     fn lasts_in(&self, fit: &Fit, study: &Study) -> bool {
@@ -134,22 +178,39 @@ impl Search<'_> {
     /// With care, if the budget suffices.
     fn effort(&self, model: &Model) -> Effort {
         let twice = 2 * (model.simulated() + STEPS + 1) * self.study.rollouts();
-        if self.study.simulator.affords(twice) { Effort::Full } else { Effort::Quick }
+        if self.study.affords(twice) { Effort::Full } else { Effort::Quick }
     }
 
     /// What a link compared, as if in all episodes.
     fn rivals(&self, screening: &Screening, link: &Link) -> Vec<Rival> {
         let share = self.share(screening);
         let first = link.base.model.parts.is_empty();
-        let rival = |fit: &Fit| Rival {
-            gain: share * (fit.log_evidence() - link.base.log_evidence()),
+        let rival = |(rank, fit): (usize, &Fit)| Rival {
+            gain: share
+                * (fit.log_evidence() - link.base.log_evidence() + if rank == 0 { link.exchanged } else { 0.0 }),
             // Nothing is decided by those of further effects.
-            heldout: if first { self.heldout(fit) } else { Vec::new() },
+            heldout: if first { self.heldout(fit) } else { Heldout::default() },
             fit: fit.clone(),
             whole: false,
         };
-        let mut rivals: Vec<Rival> = link.quick.iter().map(rival).collect();
+        let mut rivals: Vec<Rival> = link.quick.iter().enumerate().map(rival).collect();
         first_of_each(&mut rivals, |rival| added_kind(&rival.fit));
         rivals
     }
+}
+
+/// The model of `at` with the last effect of `rival` in place of its own there, and where both are.
+fn replaced(at: &Fit, place: usize, rival: &Fit) -> Option<(Model, Vec<f64>)> {
+    let other = rival.model.parts.last()?;
+    let own = &rival.x[rival.x.len() - other.coordinates.len()..];
+    let first = at.x.len() - at.model.parts.iter().map(|part| part.coordinates.len()).sum::<usize>();
+    let (mut model, mut x) = (at.model.clone(), at.x[..first].to_vec());
+    let mut from = first;
+    for (index, part) in at.model.parts.iter().enumerate() {
+        let to = from + part.coordinates.len();
+        x.extend_from_slice(if index == place { own } else { &at.x[from..to] });
+        from = to;
+    }
+    model.parts[place] = other.clone();
+    Some((model, x))
 }

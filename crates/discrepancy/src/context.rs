@@ -1,6 +1,8 @@
 //! What is known of a log before any effect is tried.
 
-use measured_log::Log;
+use std::collections::BTreeSet;
+
+use measured_log::{Channel, Episode, Log};
 use physics_model::effect;
 use physics_model::{EffectConfig, ObjectShape, ObjectTheta};
 use rayon::prelude::*;
@@ -38,16 +40,19 @@ pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels)
     };
     let has = |kind: Kind| noise.of(kind).is_some();
     let mut path: Vec<[f64; 2]> = Vec::new();
-    let mut largest_force_n = 0.0_f64;
-    for episode in &log.episodes {
+    let mut forces_n: Vec<f64> = Vec::new();
+    // Held-out episodes have no say.
+    let ids: BTreeSet<u64> = study.chosen.iter().map(|index| study.simulator.trials[*index].id).collect();
+    let fitted = || log.episodes.iter().filter(|episode| ids.contains(&episode.id));
+    for episode in fitted() {
         for row in 0..episode.rows() {
-            if let Some([x, y, _]) = episode.vector(measured_log::Channel::ObjectPosition, row)
+            if let Some([x, y, _]) = episode.vector(Channel::ObjectPosition, row)
                 && path.last().is_none_or(|last| distance(*last, [x, y]) > MOVED_M)
             {
                 path.push([x, y]);
             }
-            if let Some(f) = episode.vector(measured_log::Channel::WristForce, row) {
-                largest_force_n = largest_force_n.max(f.iter().map(|v| v * v).sum::<f64>().sqrt());
+            if let Some(f) = episode.vector(Channel::WristForce, row) {
+                forces_n.push(f.iter().map(|v| v * v).sum::<f64>().sqrt());
             }
         }
     }
@@ -60,7 +65,9 @@ pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels)
         places_m: centres(&path, PLACES),
         obstacles_m,
         patches_m,
-        largest_force_n,
+        largest_force_n: forces_n.iter().copied().fold(0.0, f64::max),
+        usual_force_n: quantile(forces_n, 0.99),
+        usual_speed_mps: quantile(fitted().flat_map(speeds_mps).collect(), 0.95),
         tool: nominal.has_tool(),
         outline: matches!(nominal.header().object.shape, measured_log::Shape::Prism { .. }),
         forces: has(Kind::WristForce) || has(Kind::JointTorque),
@@ -68,6 +75,34 @@ pub(crate) fn context(study: &Study, null: &Fit, log: &Log, noise: &NoiseLevels)
         wrist_torques: has(Kind::WristTorque),
         joint_torques: has(Kind::JointTorque),
     }
+}
+
+/// Below which a share of values lies; 0 without any.
+fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get((share * values.len() as f64) as usize).or(values.last()).copied().unwrap_or(0.0)
+}
+
+/// Time, s, over which a speed is looked at: a sensor's noise is no motion.
+const SPEED_SECS: f64 = 0.1;
+
+/// Mean speeds of the object, m/s, in such times, one after another.
+fn speeds_mps(episode: &Episode) -> Vec<f64> {
+    let mut last: Option<(f64, [f64; 3])> = None;
+    let mut speeds = Vec::new();
+    for (row, time) in episode.time_secs.iter().enumerate() {
+        let Some(place) = episode.vector(Channel::ObjectPosition, row) else { continue };
+        match last {
+            Some((begun, from)) if time - begun >= SPEED_SECS => {
+                let way = from.iter().zip(place).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+                speeds.push(way / (time - begun));
+                last = Some((*time, place));
+            }
+            None => last = Some((*time, place)),
+            Some(_) => {}
+        }
+    }
+    speeds
 }
 
 /// Farthest-point centres of a cloud of points.
@@ -90,7 +125,8 @@ fn placed(study: &Study, null: &Fit, object: &ObjectTheta) -> (Vec<Place>, Vec<P
     let simulator = study.simulator;
     let hypothesis = null.model.hypothesis(&null.x);
     let simulate = |trial| simulator.readings(&hypothesis, &simulator.nominal.engine(), Nudge::default(), trial).1;
-    let courses: Vec<(&Trial, Vec<_>)> = simulator.trials.par_iter().map(|trial| (trial, simulate(trial))).collect();
+    let fitted = || study.chosen.par_iter().map(|index| &simulator.trials[*index]);
+    let courses: Vec<(&Trial, Vec<_>)> = fitted().map(|trial| (trial, simulate(trial))).collect();
     let [x, y, _] = object.size_m;
     let outlines = Outlines {
         sides_m: (object.shape == ObjectShape::Box).then_some([0.5 * x, 0.5 * y]),

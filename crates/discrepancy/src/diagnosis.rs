@@ -3,18 +3,22 @@
 use std::ops::Range;
 
 use measured_log::Log;
+use physics_model::{EffectConfig, EffectKind};
 
 use crate::accept::Episodes;
-use crate::candidate::candidates;
+use crate::budget::Budget;
+use crate::candidate::{Candidate, Context, candidates};
 use crate::context::context;
+use crate::decision::{Decision, Probabilities};
 use crate::driven::driven;
 use crate::error::Error;
 use crate::evidence::Evidence;
+use crate::findings::Findings;
 use crate::fit::{Begin, Effort, Fit, fit};
 use crate::likelihood::mean_square;
 use crate::locate::{Cell, locate};
 use crate::model::Model;
-use crate::noise::NoiseLevels;
+use crate::noise::{NoiseLevels, SensorNoise};
 use crate::nominal::{Nominal, Tunable};
 use crate::plausible;
 use crate::progress::Progress;
@@ -23,15 +27,24 @@ use crate::report::Verdict;
 use crate::rival::Round;
 use crate::screen::{Screening, places};
 use crate::search::Search;
-use crate::simulator::Simulator;
+use crate::separate::OPEN;
+use crate::simulator::{Hypothesis, Simulator};
+use crate::split::{Compared, HeldOut, LEAST_FITTED, Split, ranking};
+use crate::stamps::period_secs;
 use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
 use crate::touch::{ContactGap, contact_gap};
-use crate::trial::{Trial, groups};
-use crate::verdict::{comes_near, verdict};
+use crate::trial::groups;
+use crate::units::Units;
+use crate::verdict::{Decided, decide};
 
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
+
+/// What the search leaves to the screening, in simulations of each of its episodes: about as many as the catalogue has strengths and places, and half as many again for scans.
+const SCREENED: usize = 130;
+/// The same of what is thrown: fewer effects show.
+const SCREENED_THROWN: usize = 80;
 
 /// What the search may do.
 #[derive(Clone, Debug)]
@@ -40,15 +53,14 @@ pub struct Settings {
     pub seed: u64,
     /// Part of how many that is held out, counted from 0 (cross-validation); `None`: what the log says.
     pub fold: Option<[usize; 2]>,
-    /// Kinds that are fitted to the episodes of the screening.
+    /// Kinds whose starts are simulated in the episodes of the screening.
+    pub looks: usize,
+    /// The best of those, that are fitted to them.
     pub quick_fits: usize,
-    /// The best of those, that are fitted to all; beside another effect kinds that are fitted to the episodes of the screening.
+    /// Beside another effect kinds that are fitted to the episodes of the screening.
     pub fits: usize,
     /// Beside another effect starts, more than one of some kinds, that are simulated to choose those by.
     pub begins: usize,
-    /// By this a difference of ln evidence is divided before it tells how sure a name is: the engine is not the world, and what it gets wrong is alike in
-    /// many readings, each of which the evidence counts.
-    pub temperature: f64,
     /// Rivals with odds above one to this are in the confusion set.
     pub confusion: f64,
     /// What an effect has to gain in ln evidence to be named.
@@ -66,28 +78,14 @@ pub struct Settings {
     pub most: usize,
     /// No fit of an effect begins a simulation that would end above this many; what is decided, drawn and told of the last ones adds up to 160, and what is lacking is looked at in 20 more.
     pub limit: usize,
-    /// Mean square of the residuals of an episode, on average over all but the worst, above which the model is not the whole story. Of the
-    /// fitted episodes that are above it before anything is named, what is named has to close half of a typical one's gap, too.
+    /// Mean square of the residuals of an episode, on average over all but the worst, above which a second effect is looked for at once.
     pub unexplained: f64,
-    /// The same of the held-out ones before anything is named, from which on what is named has to close half of the gap of a typical one;
-    /// a body in the way, which shows where it is met, has not.
-    pub gap: f64,
-    /// The same of a single held-out one above which nothing is not the whole story either.
-    pub odd: f64,
     /// Chance that some channel in some phase would stand out as much under a right model, below which another effect is looked for even
-    /// if none promises enough; above it episodes with gaps are odd ones.
+    /// if none promises enough.
     pub another: f64,
-    /// Chance that some channel in some phase would stand out as much under a right model, below which what is left is no chance.
-    pub left_by_chance: f64,
 }
 
 impl Settings {
-    /// Rivals nearer than this in ln evidence are in the confusion set.
-    #[must_use]
-    pub fn near(&self) -> f64 {
-        self.temperature * self.confusion.ln()
-    }
-
     /// For a log of so many episodes.
     fn of_episodes(&self, episodes: usize) -> Self {
         let scaled = |count: usize| count.saturating_mul(episodes.max(EPISODES)) / EPISODES;
@@ -97,8 +95,15 @@ impl Settings {
     /// For what is thrown.
     fn thrown(&self) -> Self {
         let effects = if self.effects == 0 { 0 } else { self.effects.max(self.effects_thrown) };
-        // A toss has few coordinates: another effect takes less. Whatever bounces goes another way at the least provocation, too.
-        Self { effects, rollouts: self.most, threshold: self.threshold.max(self.threshold_rolling), ..self.clone() }
+        // A toss has few coordinates: another effect takes less, and several are looked for, which leaves less for each. Whatever bounces goes another way at
+        // the least provocation, too.
+        Self {
+            effects,
+            looks: self.looks.min(self.quick_fits),
+            rollouts: self.most,
+            threshold: self.threshold.max(self.threshold_rolling),
+            ..self.clone()
+        }
     }
 }
 
@@ -107,13 +112,10 @@ impl Default for Settings {
         Self {
             seed: 1,
             fold: None,
-            quick_fits: 6,
-            fits: 3,
+            looks: 12,
+            quick_fits: 7,
+            fits: 4,
             begins: 5,
-            // The likeliest for the names of the 142 logs of seed 14 of the benchmark with an effect of the catalogue that were called `effect`, but for one
-            // whose search failed (5.0; the chance of the right names is within a factor of e from 3 to 8; with 1 it is e⁻⁷ of that). With the 75 of MuJoCo's
-            // seeds 5 to 7: 6 to 8.
-            temperature: 5.0,
             confusion: 20.0,
             // Of 28 simulated logs without an effect, 20 of boxes and cylinders gained up to 5, 8 of balls up to 17 by what else convinced; of 27 of tosses one
             // gained 10.
@@ -125,14 +127,8 @@ impl Default for Settings {
             most: 4300,
             limit: 4800,
             unexplained: 1.4,
-            gap: 1.1,
-            // At most 1.6 in the 38 logs without an effect of seeds 101, 103 and 106.
-            odd: 10.0,
             // Seed 7: a pair's second effect stands out at 0.002 or less, but for one of 11; what two spurious ones were found for, at 0.14 and 0.87.
             another: 0.05,
-            // Of 44 logs of seed 22 eight have an effect outside the catalogue: at most 0.0003. Of the others those that close less than nine tenths of a gap
-            // have at least 0.02, of ten logs of MuJoCo without an effect 0.06.
-            left_by_chance: 0.005,
         }
     }
 }
@@ -147,27 +143,43 @@ pub struct Diagnosis {
     /// Rounds of the search. The last accepted nothing, unless what its effect leaves does not stand out and no other promises enough, no more effects
     /// are allowed, several were found at once or the budget is used up.
     pub rounds: Vec<Round>,
-    /// Sums of squares of the held-out episodes: nominal and accepted model, with the errors of the accepted one.
+    /// Of the held-out episodes by which models are chosen, sums of squares: nominal and accepted model, with the errors of the accepted one.
     pub heldout: [Vec<f64>; 2],
-    /// Number of residuals of each held-out piece.
+    /// Number of residuals of each of their pieces.
     pub heldout_counts: Vec<usize>,
-    /// Of each held-out episode: number in the log, mean squares of nominal and accepted model.
+    /// Of each of them: number in the log, mean squares of nominal and accepted model.
     pub heldout_episodes: Vec<(u64, f64, f64)>,
+    /// What speaks for each rival of each round, the most probable first.
+    pub findings: Vec<Vec<Findings>>,
+    /// The held-out episodes that nothing was chosen by.
+    pub reported: HeldOut,
+    /// Mean squares of those under each effect that was compared for the first place.
+    pub ranking: Vec<(EffectKind, f64)>,
+    /// How many episodes do what.
+    pub split: Split,
     /// The verdict.
     pub verdict: Verdict,
+    /// Of the effects that were compared for the first place, of nothing and of something else.
+    pub probabilities: Probabilities,
+    /// That each effect of the accepted model is right.
+    pub confidences: Vec<f64>,
     /// Why it is `unknown`.
     pub reason: Option<String>,
     /// Effects that the nominal model had before.
     pub effects_in_model: Vec<&'static str>,
     /// Mean squares of all episodes under the accepted model.
     pub mean_squares: Vec<f64>,
-    /// What re-tuning may change.
+    /// What re-tuning may change, in units of the log.
     pub tunables: Vec<Tunable>,
+    /// Noise of the sensors, in units of the log.
+    pub noise: Vec<SensorNoise>,
+    /// Those that everything else is in but plots and what is said of an unknown gap.
+    pub(crate) units: Units,
     /// Where the re-tuned nominal model disagrees.
     pub located: Vec<Cell>,
     /// Where the accepted model still does.
     pub remaining: Vec<Cell>,
-    /// What force on the object the re-tuned nominal model lacks, where the verdict is that nothing in the catalogue explains it.
+    /// What force on the object the re-tuned nominal model lacks, where a gap is left open.
     pub lacking_force: Option<LackingForce>,
     /// How its contacts differ from the measured ones, there.
     pub contact_gap: Option<ContactGap>,
@@ -184,29 +196,25 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// Says what it is, and of a gap that nothing explains what it follows.
-    fn judge(&mut self, study: &Study, settings: &Settings) {
-        (self.verdict, self.reason) = verdict(self, settings);
-        if self.verdict == Verdict::Unknown {
-            let worst = worst(study.simulator, &study.chosen, &self.nominal);
-            self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst);
-            self.contact_gap = contact_gap(&worst);
-            if !self.model.model.parts.is_empty() && !comes_near(self) {
-                self.without_effects();
-            }
+    /// The effects of the accepted model at coordinates `x`, in units of the log.
+    pub(crate) fn effects(&self, x: &[f64]) -> Vec<EffectConfig> {
+        self.model.model.hypothesis(x).effects.iter().map(|effect| self.units.effect(effect)).collect()
+    }
+
+    /// Whether a gap is left that nothing explains: something is missing that the catalogue has not, or the engine is not the world.
+    pub(crate) fn is_open(&self) -> bool {
+        match self.verdict {
+            Verdict::Effect => false,
+            Verdict::Unknown => true,
+            Verdict::None => self.reported.errors()[0] > OPEN,
         }
     }
 
-    /// Takes back effects that explain next to nothing: nobody should plan with them.
-    fn without_effects(&mut self) {
-        let tried: Vec<&str> = self.model.model.parts.iter().map(|part| part.kind().name()).collect();
-        self.reason =
-            self.reason.take().map(|reason| format!("{reason} (the best effect that was tried: {})", tried.join(", ")));
-        self.model = self.nominal.clone();
-        self.heldout[1] = self.heldout[0].clone();
-        self.heldout_episodes.iter_mut().for_each(|(_, before, after)| *after = *before);
-        self.remaining = self.located.clone();
-        self.evidence.take_back();
+    /// Says of a gap that nothing explains what it follows.
+    fn describe(&mut self, study: &Study) {
+        let worst = worst(study.simulator, &study.chosen, &self.nominal);
+        self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst, &self.units);
+        self.contact_gap = contact_gap(&worst).map(|gap| gap.in_units(&self.units));
     }
 }
 
@@ -231,24 +239,55 @@ pub fn diagnose_watched(
     settings: &Settings,
     progress: &dyn Progress,
 ) -> Result<Diagnosis, Error> {
+    diagnose_among(log, name, nominal, settings, progress, &candidates)
+}
+
+/// The same with the candidates that `catalogue` makes of what is known of the log.
+fn diagnose_among(
+    log: &Log,
+    name: &str,
+    nominal: &Nominal,
+    settings: &Settings,
+    progress: &dyn Progress,
+    catalogue: &dyn Fn(&Context) -> Vec<Candidate>,
+) -> Result<Diagnosis, Error> {
     let log = &*driven(log, name, nominal)?;
+    let units = Units::of(log);
+    let (mut log, tunables) = (units.inverse().log(log), nominal.tunables.clone());
+    let period_secs = period_secs(&log);
+    if period_secs != log.header.period_secs {
+        log.to_mut().header.period_secs = period_secs;
+    }
+    let log = &*log;
+    let nominal = &nominal.in_units(&units.inverse())?.with_period_secs(period_secs);
     let noise = NoiseLevels::of_log(log);
-    plausible::check(log, name, nominal, &noise, LEAST_FITTED)?;
-    let Compared { trials, sides: [fitted, heldout], left_out } = trials(log, name, nominal, &noise, settings)?;
+    plausible::check(log, name, nominal, (&noise, &units), LEAST_FITTED)?;
+    let Compared { trials, fitted, choosing, reported, left_out } =
+        Compared::new(log, name, nominal, &noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
-    let simulator = Simulator::new(nominal, &trials).with_budget([settings.most, settings.limit]).watched_by(progress);
+    let simulator = Simulator::new(nominal, &trials).watched_by(progress, settings.limit);
     simulator.stage("re-tuning the nominal model");
     let engine = nominal.engine();
     // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search to all episodes, with care
     // where nothing explains much more.
     let study = Study::new(&simulator, engine, fitted);
     let (null, part, places) = null_model(&study);
+    if !null.log_evidence().is_finite() {
+        return Err(no_numbers(name));
+    }
     simulator.stage("screening the effects");
     let context = context(&study, &null, log, &noise);
-    let screening = Screening::new(&part, places, &null, &candidates(&context));
-    let kept = Study::new(&simulator, engine, heldout);
-    let mut search = Search { study, kept, part, settings, reserve: 0 };
+    // What was simulated so far depends on the log alone; what the screening takes, on the catalogue.
+    let screened = if nominal.has_tool() { SCREENED } else { SCREENED_THROWN };
+    let before = simulator.rollouts() + screened * part.rollouts();
+    let limits = [settings.rollouts, settings.most, settings.limit];
+    let budget = Budget::new(limits.map(|limit| limit.saturating_sub(before)));
+    let screening = Screening::new(&part, places, &null, &catalogue(&context));
+    let [study, kept, part] =
+        [study, Study::new(&simulator, engine, choosing), part].map(|study| study.within(&budget));
+    let reported = reported.map(|reported| Study::new(&simulator, engine, reported).within(&budget));
+    let mut search = Search { study, kept, reported, part, settings, reserve: 0 };
 
     let episodes = Episodes {
         fitted: search.study.groups(),
@@ -256,119 +295,175 @@ pub fn diagnose_watched(
         counts: search.kept.chosen.iter().map(|index| trials[*index].blocks.len()).collect(),
     };
     simulator.stage("fitting effects");
-    let (accepted, rounds, remaining) = search.effects(&screening, &null, &episodes);
+    let found = search.effects(&screening, &null, &episodes);
+    let noise = noise.all().map(|noise| noise.in_units(&units)).collect();
+    conclude(&search, found, episodes, About { log: name, units, tunables, noise, left_out })
+}
+
+/// What a diagnosis says of its log.
+struct About<'a> {
+    log: &'a str,
+    units: Units,
+    tunables: Vec<Tunable>,
+    noise: Vec<SensorNoise>,
+    left_out: Vec<u64>,
+}
+
+fn no_numbers(log: &str) -> Error {
+    let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
+    Error::Unfit { log: log.into(), reason }
+}
+
+/// From what a search accepted and compared to a verdict.
+fn conclude(
+    search: &Search,
+    (accepted, rounds): (Fit, Vec<Round>),
+    episodes: Episodes,
+    about: About,
+) -> Result<Diagnosis, Error> {
+    let (simulator, settings) = (search.study.simulator, search.settings);
     simulator.stage("comparing held-out episodes, before and after");
     let null = rounds[0].base.clone();
-    let heldout = [search.heldout(&null), search.heldout(&accepted)];
-    if !heldout.iter().flatten().all(|sum| sum.is_finite()) {
-        let reason = "expected a nominal model that can be simulated, found one whose readings are no numbers".into();
-        return Err(Error::Unfit { log: name.into(), reason });
+    let mut findings: Vec<Vec<Findings>> =
+        rounds.iter().map(|round| Findings::of_round(search, round, &episodes)).collect();
+    findings.retain(|round| !round.is_empty());
+    if rounds[0].rivals.is_empty() || findings.is_empty() {
+        findings.insert(0, vec![Findings::of_nothing(search, &null, &episodes)]);
     }
-    let heldout_episodes = by_episode(&heldout, &episodes, |place| trials[search.kept.chosen[place]].id);
+    let Decided { verdict, probabilities, confidences, model, in_part, reason } =
+        decide(Decision::shipped(), accepted, &rounds, &findings);
+    let accepted = if in_part {
+        let begin = Begin::at(&model.x);
+        fit(&search.study, model.model, begin, Effort::Quick)
+    } else {
+        model
+    };
+    let choosing = HeldOut::new(&search.kept, [&null, &accepted]);
+    let reported = search.reported.as_ref().map(|study| HeldOut::new(study, [&null, &accepted]));
+    let reported = reported.unwrap_or_else(|| choosing.clone());
+    if !null.log_evidence().is_finite() || ![&choosing, &reported].iter().all(|held| held.is_finite()) {
+        return Err(no_numbers(about.log));
+    }
     let fitted_mean = |group: &Range<usize>| mean_square(&accepted.residuals[group.clone()]);
     let mean_squares =
-        episodes.fitted.iter().map(fitted_mean).chain(heldout_episodes.iter().map(|(_, _, after)| *after)).collect();
+        episodes.fitted.iter().map(fitted_mean).chain(choosing.episodes.iter().map(|(_, _, after)| *after)).collect();
     let chosen = &search.study.chosen;
-    let located = locate(&simulator, chosen, &null, settings.seed);
-    let remaining = match remaining {
-        Some(cells) => cells,
-        None if accepted.model.parts.is_empty() => located.clone(),
-        None => locate(&simulator, chosen, &accepted, settings.seed),
+    let located = locate(simulator, chosen, &null, settings.seed);
+    let remaining = if accepted.model.parts.is_empty() {
+        located.clone()
+    } else {
+        locate(simulator, chosen, &accepted, settings.seed)
     };
     let mut diagnosis = Diagnosis {
         located,
         remaining,
-        evidence: Evidence::new(&search.kept, &null, &accepted),
+        evidence: Evidence::new(search.reported(), &null, &accepted).in_units(&about.units),
         nominal: null,
         model: accepted,
+        ranking: ranking(&rounds, search.reported()),
         rounds,
-        heldout,
-        heldout_counts: episodes.counts,
-        heldout_episodes,
+        heldout: choosing.sums,
+        heldout_counts: choosing.counts,
+        heldout_episodes: choosing.episodes,
+        split: Split::new(search),
+        reported,
+        findings,
         mean_squares,
-        verdict: Verdict::None,
-        reason: None,
-        effects_in_model: nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
-        tunables: nominal.tunables.clone(),
+        verdict,
+        probabilities,
+        confidences,
+        reason,
+        effects_in_model: simulator.nominal.effects.iter().map(|effect| effect.kind().name()).collect(),
+        tunables: about.tunables,
+        units: about.units,
+        noise: about.noise,
         lacking_force: None,
         contact_gap: None,
         rollouts: 0,
-        left_out,
-        fitted_ids: episodes.fitted.iter().map(|group| trials[chosen[group.start]].id).collect(),
+        left_out: about.left_out,
+        fitted_ids: episodes.fitted.iter().map(|group| simulator.trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };
-    diagnosis.judge(&search.study, settings);
+    if diagnosis.is_open() {
+        diagnosis.describe(&search.study);
+    }
     diagnosis.rollouts = simulator.rollouts();
     Ok(diagnosis)
 }
 
-/// Of each held-out episode, whose pieces come one after another: number in the log, mean squares before and after. `id` says the number of a piece.
-fn by_episode(heldout: &[Vec<f64>; 2], episodes: &Episodes, id: impl Fn(usize) -> u64) -> Vec<(u64, f64, f64)> {
-    let one = |group: &Range<usize>| {
-        let count = episodes.counts[group.clone()].iter().sum::<usize>().max(1) as f64;
-        let [before, after] = [0, 1].map(|i| heldout[i][group.clone()].iter().sum::<f64>() / count);
-        (id(group.start), before, after)
-    };
-    episodes.heldout.iter().map(one).collect()
-}
-
 /// The null hypothesis, re-tuned, and the episodes of the screening, with errors learnt near it.
 fn null_model<'a>(study: &Study<'a>) -> (Fit, Study<'a>, Vec<usize>) {
-    let tunables = study.simulator.nominal.tunables.len();
-    let first = fit(study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let (tunables, clocks) = (study.simulator.nominal.tunables.len(), study.simulator.nominal.clocks());
+    let mut begin = Hypothesis { z: vec![0.0; tunables], effects: Vec::new() };
+    study.set_clocks(&mut begin);
+    let first = fit(study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&begin.z), Effort::Quick);
     let places = places(study, &first);
     let mut part = study.part(&places);
     part.learn_errors(&first.model.hypothesis(&first.x));
-    let model = Model::nominal(tunables, part.engine_errors());
+    let model = Model::nominal(tunables, part.engine_errors()).with_clocks(clocks);
     let mut x = first.x;
     x.resize(model.count(), 0.0);
     (fit(&part, model, Begin::at(&x), Effort::Quick), part, places)
 }
 
-/// What a log is compared by.
-struct Compared {
-    trials: Vec<Trial>,
-    /// Places of what is fitted and of what is held out.
-    sides: [Vec<usize>; 2],
-    /// Numbers of episodes that cannot be simulated.
-    left_out: Vec<u64>,
-}
+#[cfg(test)]
+mod tests {
+    use measured_log::{Axis, Channel};
 
-/// What the log is compared by, and which of it is fitted and held out.
-fn trials(
-    log: &Log,
-    name: &str,
-    nominal: &Nominal,
-    noise: &NoiseLevels,
-    settings: &Settings,
-) -> Result<Compared, Error> {
-    let split = match settings.fold {
-        Some([part, parts]) => log.fold(settings.seed, part, parts),
-        None => log.split(settings.seed),
-    };
-    let mut trials = Vec::new();
-    let mut sides = [Vec::new(), Vec::new()];
-    let mut left_out = Vec::new();
-    for (index, episode) in log.episodes.iter().enumerate() {
-        let side = &mut sides[usize::from(split.holdout.contains(&index))];
-        let pieces = Trial::of_episode(log, episode, noise, nominal.has_tool());
-        if pieces.is_empty() {
-            left_out.push(episode.id);
+    use super::*;
+    use crate::report::Report;
+    use crate::split::reported;
+
+    fn recorded(set: &str) -> Log {
+        let logs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
+        let mut log = measured_log::read(&logs.join(set)).unwrap();
+        log.episodes.truncate(12);
+        log
+    }
+
+    /// What a report says of a log whose candidates `catalogue` changes, but for what it cost.
+    fn answer(log: &Log, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
+        let nominal = Nominal::new(&log.header, crate::rig_tool(log, None).unwrap()).unwrap();
+        let settings = Settings { looks: 6, quick_fits: 3, effects: 1, ..Settings::default() };
+        let made = |context: &Context| catalogue(candidates(context));
+        let diagnosis = diagnose_among(log, "log", &nominal, &settings, &(), &made).unwrap();
+        let mut report = serde_json::to_value(Report::new(&diagnosis, &settings, 0.0)).unwrap();
+        report.as_object_mut().unwrap().remove("rollouts");
+        report
+    }
+
+    #[test]
+    fn what_is_reported_has_no_say() {
+        let log = recorded("set-003");
+        let plain = answer(&log, |all| all);
+        let mut moved = log.clone();
+        for index in reported(&log, &log.split(1).holdout) {
+            let cells = moved.episodes[index].channels.get_mut(&Channel::ObjectPosition(Axis::X)).unwrap();
+            *cells = cells.iter().enumerate().map(|(row, x)| x.map(|x| x + 1e-4 * row as f64)).collect();
         }
-        side.extend(trials.len()..trials.len() + pieces.len());
-        trials.extend(pieces);
+        let found = answer(&moved, |all| all);
+        for key in ["verdict", "effects", "confusion_set", "retuned", "located", "remaining"] {
+            assert_eq!(found[key], plain[key], "{key}");
+        }
+        assert!(found["heldout"]["after"].as_f64() > plain["heldout"]["after"].as_f64());
+        assert_eq!(plain["split"]["shared"], false);
     }
-    let episodes = |side: &[usize]| groups(side.iter().map(|index| &trials[*index])).len();
-    let [fitted, heldout] = [episodes(&sides[0]), episodes(&sides[1])];
-    if fitted < LEAST_FITTED || heldout == 0 {
-        let reason = format!(
-            "expected at least {LEAST_FITTED} episodes to fit and one held out, each with a pose of the object and a row after it, \
-             found {fitted} and {heldout}"
-        );
-        return Err(Error::Unfit { log: name.into(), reason });
-    }
-    Ok(Compared { trials, sides, left_out })
-}
 
-/// Episodes that a fit needs: a bootstrap of fewer says nothing.
-const LEAST_FITTED: usize = 4;
+    #[test]
+    fn what_else_the_catalogue_has_and_in_which_order_changes_no_answer() {
+        let log = recorded("set-003");
+        let plain = answer(&log, |all| all);
+        let reversed = |mut all: Vec<Candidate>| {
+            all.reverse();
+            all
+        };
+        assert_eq!(answer(&log, reversed), plain, "reversed");
+        // Of one kind one is fitted, however many there are.
+        let more = |mut all: Vec<Candidate>| {
+            let leak = all.iter().find(|candidate| candidate.kind() == EffectKind::MassLeak).cloned();
+            all.extend(std::iter::repeat_n(leak, 20).flatten());
+            all
+        };
+        assert_eq!(answer(&log, more), plain, "more");
+    }
+}

@@ -10,6 +10,7 @@ use crate::likelihood::Stack;
 use crate::simulator::Nudge;
 use crate::study::Study;
 use crate::trial::{Compared, Kind, Trial};
+use crate::units::Units;
 
 /// Points of a course, at most.
 const POINTS: usize = 80;
@@ -95,17 +96,27 @@ pub struct Residuals {
 }
 
 impl Evidence {
-    /// After as before: no effect is accepted.
-    pub(crate) fn take_back(&mut self) {
-        self.path.after = self.path.before.clone();
+    /// In units of which `units` says how much one of today's is.
+    pub(crate) fn in_units(mut self, units: &Units) -> Self {
+        let scale = |values: &mut Vec<f64>, factor: f64| {
+            values.iter_mut().filter(|_| factor != 1.0).for_each(|value| *value = rounded(factor * *value));
+        };
+        let length = units.factor("m");
+        for path in [&mut self.path.measured, &mut self.path.before, &mut self.path.after] {
+            path.iter_mut().flatten().filter(|_| length != 1.0).for_each(|value| *value = rounded(length * *value));
+        }
         if let Some(course) = &mut self.course {
-            course.after = course.before.clone();
+            let factor = units.factor(course.channel.unit());
+            [&mut course.measured, &mut course.before, &mut course.after]
+                .into_iter()
+                .for_each(|all| scale(all, factor));
         }
-        self.residuals.histogram[1] = self.residuals.histogram[0].clone();
-        self.residuals.autocorrelation[1] = self.residuals.autocorrelation[0].clone();
         for error in &mut self.errors {
-            (error.after, error.median_after) = (error.before, error.median_before);
+            let factor = units.factor(error.unit);
+            let sizes = [&mut error.before, &mut error.after, &mut error.median_before, &mut error.median_after];
+            sizes.into_iter().for_each(|size| *size *= factor);
         }
+        self
     }
 
     /// Of the held-out episodes.
@@ -200,7 +211,7 @@ fn errors(trials: &[&Trial], raw: &[Vec<Vec<f64>>; 2]) -> Vec<ChannelError> {
 /// Σ r(t) r(t + lag) over Σ r², each channel of each episode by itself.
 fn autocorrelation(trials: &[&Trial], stack: &Stack, lag: usize) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
-    for (trial, residuals) in trials.iter().zip(stack) {
+    for (trial, residuals) in trials.iter().zip(stack.iter()) {
         let finite = |place: usize| Some(residuals[place]).filter(|value: &f64| value.is_finite()).unwrap_or(0.0);
         for (place, block) in trial.blocks.iter().enumerate() {
             squares += finite(place).powi(2);

@@ -29,19 +29,23 @@ pub struct Fit {
     pub residuals: Stack,
     /// Their derivatives by the coordinates, as finite differences there.
     pub jacobian: Vec<Stack>,
+    log_evidence: f64,
 }
 
 impl Fit {
+    /// With its ln evidence.
+    #[must_use]
+    pub fn new(model: Model, x: Vec<f64>, raw: Vec<Vec<f64>>, residuals: Stack, jacobian: Vec<Stack>) -> Self {
+        let log_evidence = log_evidence(&model, &x, &residuals, &jacobian);
+        Self { model, x, raw, residuals, jacobian, log_evidence }
+    }
+
     /// The same as seen by some of the episodes alone.
     #[must_use]
     pub fn part(&self, places: &[usize]) -> Self {
-        Self {
-            model: self.model.clone(),
-            x: self.x.clone(),
-            raw: places.iter().map(|place| self.raw[*place].clone()).collect(),
-            residuals: pick(&self.residuals, places),
-            jacobian: self.jacobian.iter().map(|column| pick(column, places)).collect(),
-        }
+        let raw = places.iter().map(|place| self.raw[*place].clone()).collect();
+        let jacobian = self.jacobian.iter().map(|column| pick(column, places)).collect();
+        Self::new(self.model.clone(), self.x.clone(), raw, pick(&self.residuals, places), jacobian)
     }
 
     /// −ln posterior there, but for a constant.
@@ -50,23 +54,24 @@ impl Fit {
         cost(&self.x, &self.residuals)
     }
 
-    /// Laplace's ln evidence.
+    /// Laplace's ln evidence; −∞ for a fit that failed.
     #[must_use]
     pub fn log_evidence(&self) -> f64 {
-        let cost = self.cost();
-        if cost.is_infinite() {
-            return f64::NEG_INFINITY;
-        }
-        let n = self.x.len();
-        let weights = weights(&self.residuals);
-        let hessian = DMatrix::from_fn(n, n, |i, j| {
-            dot(&self.jacobian[i], &self.jacobian[j], &weights) + f64::from(u8::from(i == j))
-        });
-        let determinant =
-            hessian.cholesky().map_or(0.0, |c| 2.0 * c.l().diagonal().iter().map(|d| d.ln()).sum::<f64>());
-        let sides = self.model.one_sided() as f64 * std::f64::consts::LN_2;
-        -cost - 0.5 * determinant + sides
+        self.log_evidence
     }
+}
+
+/// Laplace's ln evidence. A fit whose residuals or derivatives are no numbers says nothing for its model: −∞.
+fn log_evidence(model: &Model, x: &[f64], residuals: &Stack, jacobian: &[Stack]) -> f64 {
+    let n = x.len();
+    let weights = weights(residuals);
+    let hessian =
+        DMatrix::from_fn(n, n, |i, j| dot(&jacobian[i], &jacobian[j], &weights) + f64::from(u8::from(i == j)));
+    let Some(cholesky) = hessian.cholesky() else { return f64::NEG_INFINITY };
+    let half_determinant: f64 = cholesky.l().diagonal().iter().map(|d| d.ln()).sum();
+    let sides = model.one_sided() as f64 * std::f64::consts::LN_2;
+    let found = -cost(x, residuals) - half_determinant + sides;
+    if found.is_finite() { found } else { f64::NEG_INFINITY }
 }
 
 /// How long a fit may take.
@@ -121,7 +126,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
     let mut before = f64::INFINITY;
     for round in 0..rounds {
         let now = cost(&x, &residuals);
-        if round > 0 && (study.simulator.exhausted() || (round > 1 && before - now < LITTLE * now)) {
+        if round > 0 && (!study.has_fits() || (round > 1 && before - now < LITTLE * now)) {
             break;
         }
         before = now;
@@ -133,7 +138,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
         let mut moved = false;
         for _ in 0..STEPS {
             // What everything else is compared with is fitted whatever it costs.
-            if !model.parts.is_empty() && !study.simulator.affords(simulation) {
+            if !model.parts.is_empty() && !study.affords(simulation) {
                 break;
             }
             let Some(step) = step(&model, &x, &residuals, &jacobian, damping) else { break };
@@ -149,9 +154,9 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             let found_raw = study.raw(&model.hypothesis(&next));
             let found = study.white(&found_raw, model.engine_errors(&next));
             let gain = cost(&x, &residuals) - cost(&next, &found);
-            broyden(&model, &mut jacobian, &residuals, &found, &step.delta);
             moved = true;
             if gain > 0.0 {
+                broyden(&model, &mut jacobian, &residuals, &found, &step.delta);
                 (x, raw, residuals) = (next, found_raw, found);
                 damping = (damping * 0.2).max(1e-6);
             } else {
@@ -159,15 +164,15 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             }
         }
         if round > 0 && !moved {
-            return Fit { model, x, raw, residuals, jacobian };
+            return Fit::new(model, x, raw, residuals, jacobian);
         }
     }
     // Nearer than a finite difference reaches, Broyden's is as good as another.
     let near = fresh.is_some_and(|fresh| fresh.iter().zip(&x).all(|(a, b)| (a - b).abs() < NEAR * STEP));
-    if effort == Effort::Full && !near && study.simulator.affords(model.simulated() * simulation) {
+    if effort == Effort::Full && !near && study.affords(model.simulated() * simulation) {
         jacobian = derivatives(study, &model, &x, (&raw, &residuals));
     }
-    Fit { model, x, raw, residuals, jacobian }
+    Fit::new(model, x, raw, residuals, jacobian)
 }
 
 /// −ln posterior but for a constant.
@@ -277,6 +282,25 @@ fn broyden(model: &Model, jacobian: &mut [Stack], before: &Stack, after: &Stack,
         }
         for index in (0..delta.len()).filter(unsure) {
             jacobian[index][place].axpy(delta[index] / length, &surprise, 1.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fit_whose_derivatives_are_no_numbers_has_no_evidence() {
+        let stack = |size: f64| Stack::from(vec![DVector::from_element(20, size); 3]);
+        let evidence = |residuals: Stack, jacobian: Stack| {
+            Fit::new(Model::nominal(1, 0), vec![0.5], Vec::new(), residuals, vec![jacobian]).log_evidence()
+        };
+        // The larger the derivatives the smaller the share of the prior that fits.
+        assert!(evidence(stack(1.0), stack(10.0)) < evidence(stack(1.0), stack(1.0)));
+        for broken in [f64::NAN, f64::INFINITY, f64::MAX] {
+            assert_eq!(evidence(stack(1.0), stack(broken)), f64::NEG_INFINITY, "{broken}");
+            assert_eq!(evidence(stack(broken), stack(1.0)), f64::NEG_INFINITY, "{broken}");
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::model::Model;
 use crate::noise::NoiseLevels;
 use crate::nominal::{Engine, Nominal};
 use crate::simulator::{Hypothesis, Nudge, Simulator};
+use crate::split::reported;
 use crate::study::Study;
 use crate::trial::Trial;
 
@@ -33,10 +34,10 @@ impl<'a> Explanation<'a> {
     }
 }
 
-/// Held-out mean squares of `explanations`, with the errors that last learnt at `learnt_at`. The split is that of a diagnosis with this seed.
+/// Mean squares of `explanations` on the held-out episodes that a report is of, with the errors that last learnt at `learnt_at`. The split is that of a diagnosis with this seed.
 #[must_use]
 pub fn mean_squares(log: &Log, learnt_at: &Nominal, explanations: &[Explanation], seed: u64) -> Vec<f64> {
-    let trials = trials(log, &log.split(seed).holdout, learnt_at.has_tool());
+    let trials = trials(log, &reported(log, &log.split(seed).holdout), learnt_at.has_tool());
     let simulator = Simulator::new(learnt_at, &trials);
     let mut study = Study::new(&simulator, learnt_at.engine(), (0..trials.len()).collect());
     study.learn_errors(&at_means(learnt_at));
@@ -55,10 +56,11 @@ pub fn retuned(log: &Log, nominal: &Nominal, seed: u64) -> Nominal {
     let trials = trials(log, &log.split(seed).fit, nominal.has_tool());
     let simulator = Simulator::new(nominal, &trials);
     let mut study = Study::new(&simulator, nominal.engine(), (0..trials.len()).collect());
-    let tunables = nominal.tunables.len();
-    let first = fit(&study, Model::nominal(tunables, 0), Begin::at(&vec![0.0; tunables]), Effort::Quick);
+    let (tunables, clocks) = (nominal.tunables.len(), nominal.clocks());
+    let first =
+        fit(&study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&vec![0.0; tunables]), Effort::Quick);
     study.learn_errors(&first.model.hypothesis(&first.x));
-    let model = Model::nominal(tunables, study.engine_errors());
+    let model = Model::nominal(tunables, study.engine_errors()).with_clocks(clocks);
     let mut x = first.x;
     x.resize(model.count(), 0.0);
     let found = fit(&study, model, Begin::at(&x), Effort::Full);

@@ -34,13 +34,18 @@
 
 mod accept;
 mod begin;
+pub mod budget;
 pub mod candidate;
+mod cells;
 mod chain;
+mod clock;
 mod context;
+pub mod decision;
 pub mod diagnosis;
 mod driven;
 mod error;
 pub mod evidence;
+pub mod findings;
 pub mod fit;
 pub mod heldout;
 pub mod interval;
@@ -63,10 +68,13 @@ pub mod screen;
 mod search;
 pub mod separate;
 pub mod simulator;
+pub mod split;
+mod stamps;
 pub mod study;
 pub mod terms;
 pub mod touch;
 pub mod trial;
+mod units;
 mod verdict;
 pub mod whitener;
 

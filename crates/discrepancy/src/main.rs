@@ -205,6 +205,9 @@ fn print_summary(report: &Report) {
     if let Some(sentence) = report.left_out_sentence() {
         program::out!("  {sentence}");
     }
+    report.retuned_sentences().iter().for_each(|sentence| program::out!("  {sentence}"));
+    program::out!("  {}", report.noise_sentence());
+    program::out!("  {}", report.split.sentence());
     program::out!("  next experiment: {}", report.next_experiment);
     program::out!("{} simulated episodes, {:.0} s", report.rollouts, report.seconds);
 }

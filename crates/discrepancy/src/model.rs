@@ -2,6 +2,7 @@
 //! the effects that it is given. All have prior N(0, 1).
 
 use crate::candidate::Candidate;
+use crate::clock::Clock;
 use crate::simulator::Hypothesis;
 
 /// Re-tuning reaches this many prior standard deviations.
@@ -16,6 +17,8 @@ pub(crate) const STEP: f64 = 0.2;
 pub struct Model {
     /// Number of the nominal model's tunables.
     pub tunables: usize,
+    /// Number of clocks among them, the first ones.
+    pub clocks: usize,
     /// Number of the engine's errors.
     pub errors: usize,
     /// Effects.
@@ -26,7 +29,13 @@ impl Model {
     /// The nominal model alone.
     #[must_use]
     pub fn nominal(tunables: usize, errors: usize) -> Self {
-        Self { tunables, errors, parts: Vec::new() }
+        Self { tunables, clocks: 0, errors, parts: Vec::new() }
+    }
+
+    /// Of whose tunables the first are so many clocks.
+    #[must_use]
+    pub fn with_clocks(self, clocks: usize) -> Self {
+        Self { clocks, ..self }
     }
 
     /// With a further effect.
@@ -46,13 +55,14 @@ impl Model {
     /// Number of those of which a simulation depends.
     #[must_use]
     pub fn simulated(&self) -> usize {
-        self.count() - self.errors
+        self.count() - self.errors - self.clocks
     }
 
     /// Range of a coordinate.
     #[must_use]
     pub fn range(&self, index: usize) -> [f64; 2] {
         match index.checked_sub(self.tunables) {
+            None if index < self.clocks => Clock::ALL[index].range(),
             None => [-TUNABLE_RANGE, TUNABLE_RANGE],
             Some(index) if index < self.errors => [-ERROR_RANGE, ERROR_RANGE],
             Some(index) => {
@@ -71,6 +81,9 @@ impl Model {
     /// Step of a finite difference at `x`, away from a border.
     #[must_use]
     pub fn step(&self, x: &[f64], index: usize) -> f64 {
+        if index < self.clocks {
+            return Clock::ALL[index].step(x[index]);
+        }
         if x[index] + STEP <= self.range(index)[1] { STEP } else { -STEP }
     }
 

@@ -74,7 +74,7 @@ impl ModelFile {
     /// Of a diagnosis that began with `nominal`, which is what the file `begun` made of it.
     #[must_use]
     pub fn new(nominal: &Nominal, diagnosis: &Diagnosis, report: &Report, begun: Option<&Self>) -> Self {
-        let found = diagnosis.model.model.hypothesis(&diagnosis.model.x).effects;
+        let found = diagnosis.effects(&diagnosis.model.x);
         let known = begun.map_or(&[][..], |begun| &begun.interval);
         Self {
             version: VERSION,

@@ -8,14 +8,19 @@ use std::sync::Arc;
 use measured_log::{Header, Number, Shape};
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::rig::{Prism, Rig, RigObject, RigShape, RigTool};
-use physics_model::{EffectConfig, ObjectShape};
+use physics_model::{EffectConfig, EffectKind, ObjectShape};
 
+use crate::clock::Clock;
 use crate::error::Error;
+use crate::units::Units;
 
 /// Engine step, s, at most.
 const LONGEST_STEP_SECS: f64 = 1.0 / 60.0;
-/// Friction of tool and object where the log does not say.
+/// Friction of tool and object where the log does not say, and its standard deviation as a share of it.
 const TOOL_FRICTION: f64 = 0.2;
+const TOOL_FRICTION_UNKNOWN: f64 = 0.5;
+/// The same of one that it says exactly: engines with cones, pyramids and patches slide at forces that differ by as much.
+const TOOL_FRICTION_SHARE: f64 = 0.15;
 
 /// Engine step, s, of what is thrown, at most: an eighth of a tick at 148 Hz.
 const THROWN_STEP_SECS: f64 = 0.000_85;
@@ -24,6 +29,13 @@ const THROWN_STEP_SECS: f64 = 0.000_85;
 const THROWN_FREQUENCY_HZ: f64 = 200.0;
 /// Critically damped: what bounces back is said by the restitution.
 const THROWN_DAMPING_RATIO: f64 = 1.0;
+
+/// Standard deviation of the logarithm of a contact's natural frequency and damping ratio: a factor of two. MuJoCo's default contacts are softer than
+/// ours by about as much, those of Bullet and of real tables stiffer.
+const CONTACT_SPREAD: f64 = 0.7;
+
+/// How far contacts reach, in these: beyond a factor of eight no contact is one.
+const CONTACT_RANGE: f64 = 3.0;
 
 /// How exactly the engine solves. Variants of it show how far its answers can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,6 +114,22 @@ enum Place {
     Size(usize),
     Inertia(usize),
     Restitution,
+    Clock(Clock),
+    ContactFrequency,
+    ContactDamping,
+}
+
+impl Place {
+    fn unit(self) -> &'static str {
+        match self {
+            Self::TableFriction | Self::ToolFriction | Self::Restitution | Self::ContactDamping => "",
+            Self::ContactFrequency => "Hz",
+            Self::Clock(_) => "s",
+            Self::TableHeight | Self::Com(_) | Self::Size(_) => "m",
+            Self::Mass => "kg",
+            Self::Inertia(_) => "kg·m²",
+        }
+    }
 }
 
 /// The nominal model.
@@ -135,9 +163,38 @@ impl Nominal {
         Ok(nominal)
     }
 
+    /// The same of ticks of another duration, s.
+    pub(crate) fn with_period_secs(mut self, period_secs: f64) -> Self {
+        self.header.period_secs = period_secs;
+        self
+    }
+
+    /// The same in other units, of which `units` says how much one of today's is.
+    pub(crate) fn in_units(&self, units: &Units) -> Result<Self, Error> {
+        let tool = match &self.tool {
+            RigTool::Ball { radius_m } => RigTool::Ball { radius_m: units.factor("m") * radius_m },
+            tool => tool.clone(),
+        };
+        let mut nominal = Self::new(&units.header(&self.header), tool)?;
+        for (scaled, tunable) in nominal.tunables.iter_mut().zip(&self.tunables) {
+            scaled.mean = units.factor(tunable.place.unit()) * tunable.mean;
+        }
+        nominal.effects = self.effects.iter().map(|effect| units.effect(effect)).collect();
+        Ok(nominal)
+    }
+
     fn uncertain(&self) -> Vec<Tunable> {
         let header = &self.header;
-        let mut all = Vec::new();
+        // First, where [`crate::model`] looks for them.
+        let clocks = Clock::ALL.into_iter().filter(|_| self.has_tool());
+        let clock = |clock: Clock| Tunable {
+            key: clock.key().into(),
+            mean: 0.0,
+            stddev: clock.stddev_secs(),
+            positive: false,
+            place: Place::Clock(clock),
+        };
+        let mut all: Vec<Tunable> = clocks.map(clock).collect();
         let mut add = |key: String, number: Number, positive: bool, place: Place| {
             if let Number::Uncertain { mean, stddev } = number {
                 all.push(Tunable { key, mean, stddev, positive, place });
@@ -145,8 +202,8 @@ impl Nominal {
         };
         add("table.height_m".into(), header.table.height_m, false, Place::TableHeight);
         add("table.friction".into(), header.table.friction, true, Place::TableFriction);
-        if let Some(friction) = header.tool_friction {
-            add("tool_friction".into(), friction, true, Place::ToolFriction);
+        if self.has_tool() {
+            add("tool_friction".into(), self.tool_friction(), true, Place::ToolFriction);
         }
         let object = &header.object;
         add("object.mass_kg".into(), object.mass_kg, true, Place::Mass);
@@ -162,7 +219,34 @@ impl Nominal {
         if let Some(restitution) = object.restitution {
             add("object.restitution".into(), restitution, true, Place::Restitution);
         }
+        all.extend(self.contact());
         all
+    }
+
+    /// Friction of tool and object. One that is given exactly is exact in another law of friction than the engine's.
+    fn tool_friction(&self) -> Number {
+        let about = |mean: f64, share: f64| Number::Uncertain { mean, stddev: share * mean };
+        match self.header.tool_friction {
+            Some(Number::Fixed(mean)) if mean > 0.0 => about(mean, TOOL_FRICTION_SHARE),
+            Some(number) => number,
+            None => about(TOOL_FRICTION, TOOL_FRICTION_UNKNOWN),
+        }
+    }
+
+    /// How stiff contacts are, and how much they damp: no log says it, and engines differ by factors.
+    fn contact(&self) -> [Tunable; 2] {
+        let engine = self.engine();
+        let tunable = |key: &str, mean: f64, place| Tunable {
+            key: key.into(),
+            mean,
+            stddev: CONTACT_SPREAD * mean,
+            positive: true,
+            place,
+        };
+        [
+            tunable("contact.frequency_hz", engine.contact_frequency_hz, Place::ContactFrequency),
+            tunable("contact.damping_ratio", engine.contact_damping_ratio, Place::ContactDamping),
+        ]
     }
 
     /// The log's header.
@@ -212,6 +296,29 @@ impl Nominal {
         self.tunables.iter().any(|tunable| tunable.key == key)
     }
 
+    /// Number of clocks that may be skewed: the first of what re-tuning may change.
+    #[must_use]
+    pub fn clocks(&self) -> usize {
+        self.tunables.iter().filter(|tunable| matches!(tunable.place, Place::Clock(_))).count()
+    }
+
+    /// By how much clocks at coordinates `z` are late, s, in the order of [`Clock::ALL`], beside these effects.
+    pub(crate) fn skews_secs<'a>(&self, z: &[f64], effects: impl Iterator<Item = &'a EffectConfig>) -> [f64; 2] {
+        let kinds: Vec<EffectKind> = effects.map(EffectConfig::kind).collect();
+        Clock::ALL.map(|clock| {
+            let place = self.tunables.iter().position(|tunable| tunable.place == Place::Clock(clock));
+            let replaced = kinds.iter().any(|kind| clock.gives_way_to(*kind));
+            place.filter(|_| !replaced).map_or(0.0, |place| self.tunables[place].value(z[place]))
+        })
+    }
+
+    /// Coordinates of clocks that give way to an effect.
+    pub(crate) fn replaced_by(&self, kind: EffectKind) -> impl Iterator<Item = usize> + '_ {
+        let gives_way =
+            move |tunable: &Tunable| matches!(tunable.place, Place::Clock(clock) if clock.gives_way_to(kind));
+        self.tunables.iter().enumerate().filter(move |(_, tunable)| gives_way(tunable)).map(|(index, _)| index)
+    }
+
     /// Whether the object rolls.
     #[must_use]
     pub fn rolls(&self) -> bool {
@@ -231,21 +338,31 @@ impl Nominal {
         }
     }
 
+    /// Coordinates with contacts as the model has them.
+    pub(crate) fn with_own_contacts(&self, z: &[f64]) -> Vec<f64> {
+        let contact = |place: Place| matches!(place, Place::ContactFrequency | Place::ContactDamping);
+        (self.tunables.iter().zip(z)).map(|(tunable, z)| if contact(tunable.place) { 0.0 } else { *z }).collect()
+    }
+
+    /// A tunable's value in its prior mean; 1 where re-tuning may not change it.
+    fn factor(&self, z: &[f64], place: Place) -> f64 {
+        let index = self.tunables.iter().position(|tunable| tunable.place == place);
+        let value = |index: usize| self.tunables[index].value(z[index].clamp(-CONTACT_RANGE, CONTACT_RANGE));
+        index.map_or(1.0, |index| value(index) / self.tunables[index].mean)
+    }
+
     /// The rig with coordinates `z`.
     #[must_use]
     pub fn rig(&self, z: &[f64], engine: &Engine) -> Rig {
         let header = &self.header;
         let steps = self.steps() * engine.refinement;
-        let tool_friction = match header.tool_friction {
-            Some(number) => self.value(z, Place::ToolFriction, number),
-            None => TOOL_FRICTION,
-        };
+        let tool_friction = self.value(z, Place::ToolFriction, self.tool_friction());
         let world = WorldConfig {
             control_period_secs: header.period_secs / f64::from(steps),
             control_steps: 1,
             solver_iterations: engine.solver_iterations,
-            contact_frequency_hz: engine.contact_frequency_hz,
-            contact_damping_ratio: engine.contact_damping_ratio,
+            contact_frequency_hz: self.factor(z, Place::ContactFrequency) * engine.contact_frequency_hz,
+            contact_damping_ratio: self.factor(z, Place::ContactDamping) * engine.contact_damping_ratio,
             table_height_m: self.value(z, Place::TableHeight, header.table.height_m),
             gravity_mps2: header.gravity_mps2,
             tool_friction,

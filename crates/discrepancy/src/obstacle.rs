@@ -131,9 +131,9 @@ impl Seen {
         self.witnesses.iter().map(|witness| witness.vote(*place, *radius_m, self.outlines)).sum()
     }
 
-    /// How near, m, object or tool come to a body in a trial until something happens; below 0 where they would be in it.
-    fn apart_m(&self, trial: usize, (place, radius_m): Place) -> f64 {
-        let witness = &self.witnesses[trial];
+    /// How near, m, object or tool come to a body in the course at this place until something happens; below 0 where they would be in it.
+    fn apart_m(&self, course: usize, (place, radius_m): Place) -> f64 {
+        let witness = &self.witnesses[course];
         let rows = witness.before.iter().chain(witness.event.as_ref().map(|event| &event.row));
         let apart_m = |row| self.outlines.off_object(place, row).min(self.outlines.off_tool(place, row));
         rows.map(apart_m).fold(f64::INFINITY, f64::min) - radius_m

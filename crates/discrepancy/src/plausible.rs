@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::noise::NoiseLevels;
 use crate::nominal::Nominal;
 use crate::trial::Kind;
+use crate::units::Units;
 
 /// Ticks a row, or rows a tick, at most: logs may be thinned, and lack rows.
 const TICKS_A_ROW: f64 = 100.0;
@@ -19,12 +20,18 @@ const MOVES: f64 = 10.0;
 const COMMAND_M: f64 = 1e-4;
 
 /// Refuses a log whose times are no times of its ticks, whose object is nowhere near the table it is pushed over, or in which fewer than `least` episodes
-/// show any motion.
+/// show any motion. Lengths are in `units`; what is said of them is not.
 ///
 /// # Errors
 ///
 /// [`Error::Unfit`] with what was expected and found.
-pub(crate) fn check(log: &Log, name: &str, nominal: &Nominal, noise: &NoiseLevels, least: usize) -> Result<(), Error> {
+pub(crate) fn check(
+    log: &Log,
+    name: &str,
+    nominal: &Nominal,
+    (noise, units): (&NoiseLevels, &Units),
+    least: usize,
+) -> Result<(), Error> {
     let refuse = |reason: String| Err(Error::Unfit { log: name.into(), reason });
     let period_secs = log.header.period_secs;
     let mut all = 0.0;
@@ -55,6 +62,7 @@ pub(crate) fn check(log: &Log, name: &str, nominal: &Nominal, noise: &NoiseLevel
             let Some([_, _, z]) = place else { continue };
             let height_m = z - table_m;
             if height_m.abs() > 2.0 * size_m + 0.05 + unsure_m {
+                let [size_m, table_m, height_m] = [size_m, table_m, height_m].map(|length| units.factor("m") * length);
                 return refuse(format!(
                     "episode {}: expected an object of {size_m} m that begins on the table at table.height_m = {table_m}, found its centre {height_m} m above it: are \
                      positions in m, and in the same frame?",

@@ -2,9 +2,24 @@
 
 use physics_model::EffectKind;
 
-use crate::accept::heldout_gains;
 use crate::fit::Fit;
 use crate::screen::Promise;
+
+/// What a model leaves of the held-out episodes, piece by piece.
+#[derive(Clone, Debug, Default)]
+pub struct Heldout {
+    /// Sums of squares.
+    pub squares: Vec<f64>,
+    /// −ln p, but for a constant.
+    pub costs: Vec<f64>,
+}
+
+impl Heldout {
+    /// What each piece gains in ln p from this model to another.
+    pub(crate) fn gains(&self, after: &Self) -> Vec<f64> {
+        self.costs.iter().zip(&after.costs).map(|(before, after)| before - after).collect()
+    }
+}
 
 /// A fitted model with a further effect.
 #[derive(Clone, Debug)]
@@ -15,8 +30,8 @@ pub struct Rival {
     pub whole: bool,
     /// ln evidence over that of the model without; of what was fitted to the episodes of the screening alone what that promises for all.
     pub gain: f64,
-    /// Sums of squares of the held-out episodes; empty where nothing is decided by them.
-    pub heldout: Vec<f64>,
+    /// What it leaves of the held-out episodes; nothing where nothing is decided by them.
+    pub heldout: Heldout,
 }
 
 impl Rival {
@@ -42,8 +57,8 @@ pub struct Round {
     pub passed_over: Vec<Rival>,
     /// The model that they were added to, with the same errors; of several effects that were fitted together the nominal one.
     pub base: Fit,
-    /// Sums of squares of the held-out episodes under that model.
-    pub before: Vec<f64>,
+    /// What that model leaves of the held-out episodes.
+    pub before: Heldout,
     /// Whether the rivals were compared in haste: a second effect seemed to be missing.
     pub hasty: bool,
 }
@@ -59,12 +74,15 @@ impl Round {
         self.passed_over.iter().filter(|rival| self.rivals.iter().all(|found| found.kind() != rival.kind()))
     }
 
-    /// Of these the kind, and by how much more they explain all episodes than the first rival does, those held out (of which each piece has so many residuals) among them:
-    /// ln evidence of what was fitted, ln p of what was not.
-    pub(crate) fn passed_over(&self, counts: &[usize]) -> Vec<(EffectKind, f64)> {
-        let Some(first) = self.rivals.first() else { return Vec::new() };
-        let all = |rival: &Rival| rival.gain + heldout_gains(&self.before, &rival.heldout, counts).iter().sum::<f64>();
-        self.passed_over_kinds().map(|rival| (rival.kind(), all(rival) - all(first))).collect()
+    /// All that were compared.
+    pub(crate) fn fits(&self) -> Vec<Fit> {
+        self.rivals.iter().chain(&self.passed_over).map(|rival| rival.fit.clone()).collect()
+    }
+
+    /// The rival of this name that gains most.
+    pub(crate) fn rival(&self, name: &str) -> Option<&Rival> {
+        let named = self.rivals.iter().chain(&self.passed_over).filter(|rival| rival.kind().name() == name);
+        named.max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
     /// The fit of the first rival, or that of the model without one.
@@ -106,32 +124,32 @@ pub(crate) fn of_first<T, K: PartialEq>(list: &mut Vec<T>, count: usize, key: im
 mod tests {
     use super::*;
     use crate::candidate::{candidates, tests::context};
+    use crate::likelihood::Stack;
     use crate::model::Model;
 
-    /// A rival that gains so much and leaves such a sum of squares of 100 held-out residuals.
-    fn rival(kind: EffectKind, gain: f64, left: f64) -> Rival {
+    /// A rival that gains so much.
+    fn rival(kind: EffectKind, gain: f64) -> Rival {
         let candidate = candidates(&context()).into_iter().find(|candidate| candidate.kind() == kind).unwrap();
         let model = Model::nominal(0, 0).with(&candidate);
-        let fit = Fit { model, x: Vec::new(), raw: Vec::new(), residuals: Vec::new(), jacobian: Vec::new() };
-        Rival { fit, whole: true, gain, heldout: vec![left] }
+        let fit = Fit::new(model, Vec::new(), Vec::new(), Stack::default(), Vec::new());
+        Rival { fit, whole: true, gain, heldout: Heldout::default() }
     }
 
     #[test]
-    fn what_held_out_episodes_speak_against_is_weighed_by_all_of_them() {
+    fn a_rival_is_found_by_its_name_also_where_it_was_passed_over() {
         use EffectKind as K;
-        let rivals = vec![rival(K::TimeBase, 80.0, 104.0), rival(K::FrictionLevel, 40.0, 98.0)];
-        let base = rival(K::Tether, 0.0, 100.0).fit;
+        let rivals = vec![rival(K::TimeBase, 80.0), rival(K::FrictionLevel, 40.0), rival(K::FrictionLevel, 50.0)];
+        let (promises, base) = (Vec::new(), rival(K::Tether, 0.0).fit);
         let mut round =
-            Round { promises: Vec::new(), rivals, passed_over: Vec::new(), base, before: vec![100.0], hasty: false };
-        assert!(round.passed_over(&[100]).is_empty());
+            Round { promises, rivals, passed_over: Vec::new(), base, before: Heldout::default(), hasty: false };
         round.pass_over(1);
-        let [(kind, more)] = round.passed_over(&[100])[..] else { panic!("one was passed over") };
-        // 40 of what was fitted, less what the held-out ones say.
-        assert_eq!(kind, K::TimeBase);
-        assert!((30.0..40.0).contains(&more), "{more}");
+        assert_eq!(round.rival("time_base").unwrap().gain, 80.0);
+        assert_eq!(round.rival("friction_level").unwrap().gain, 50.0);
+        assert!(round.rival("tether").is_none());
+        assert_eq!(round.passed_over_kinds().count(), 1);
         // Once it is a rival again it is no other.
-        round.rivals.push(rival(K::TimeBase, 10.0, 100.0));
-        assert!(round.passed_over(&[100]).is_empty());
+        round.rivals.push(rival(K::TimeBase, 10.0));
+        assert_eq!(round.passed_over_kinds().count(), 0);
     }
 
     #[test]

@@ -1,4 +1,8 @@
-//! Which effects could explain what the re-tuned nominal model leaves: one linear step for each.
+//! Which effects could explain what the re-tuned nominal model leaves.
+//!
+//! For each candidate a linear step, measured near the nominal model, and a scan of its strengths over what is plausible: what rolls, slides off or meets
+//! a tool elsewhere is no multiple of what a slight effect does. Clocks are set anew at each point of a scan, which costs no simulation: without the effect they
+//! may have been re-tuned to stand for it.
 
 use std::ops::Range;
 
@@ -6,8 +10,8 @@ use nalgebra::{DMatrix, DVector};
 use physics_model::EffectKind;
 
 use crate::candidate::Candidate;
-use crate::fit::Fit;
-use crate::likelihood::{self, Stack, dot, weights};
+use crate::fit::{Fit, cost};
+use crate::likelihood::{self, Stack, dot, pick, weights};
 use crate::study::{Study, difference};
 
 /// Episodes that the screening looks at, at most.
@@ -17,7 +21,16 @@ const EPISODES_THROWN: usize = 8;
 /// An episode lasts long if it does so many times as long as the mean.
 const LONG: f64 = 3.0;
 
-/// What a linear step says of a candidate.
+/// How far from neutral, in units, a linear step is measured: far enough to stand out of the solver's grain.
+const REACH: f64 = 0.35;
+/// Episodes of the screening in which strengths are scanned, at most.
+const SCANNED: usize = 4;
+/// Strengths that are looked at, in units, either way as far as they are within the range...
+const STRENGTHS: [f64; 2] = [0.5, 2.0];
+/// ... and, from the best of those, weaker or stronger ones.
+const BEYOND: [f64; 2] = [0.125, 8.0];
+
+/// What the screening says of a candidate.
 #[derive(Clone, Debug)]
 pub struct Promise {
     /// The candidate.
@@ -30,6 +43,17 @@ pub struct Promise {
     pub begin: Vec<f64>,
     /// By how much the coordinates of the model without it would move then.
     pub beside: Vec<f64>,
+    /// The best point of the scan, if it gains anything.
+    pub(crate) start: Option<Start>,
+}
+
+/// Where a fit may begin.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Start {
+    /// Coordinates of the clocks.
+    pub(crate) clocks: Vec<f64>,
+    /// Those of the candidate.
+    pub(crate) own: Vec<f64>,
 }
 
 /// What was simulated for the screening: it serves again when an effect has been accepted.
@@ -37,7 +61,16 @@ pub struct Promise {
 pub struct Screening {
     /// Places in the study of the episodes that it looks at.
     pub places: Vec<usize>,
-    columns: Vec<(Candidate, Columns)>,
+    /// Which of those are scanned.
+    scanned: Vec<usize>,
+    screened: Vec<Screened>,
+}
+
+#[derive(Debug)]
+struct Screened {
+    candidate: Candidate,
+    columns: Columns,
+    points: Vec<Point>,
 }
 
 /// Changes of residuals that are not white: what is white changes when errors are learnt anew.
@@ -49,54 +82,77 @@ enum Columns {
     Whole(Vec<Vec<f64>>),
 }
 
+/// A point of a scan, with the changes of residuals there.
+#[derive(Debug)]
+struct Point {
+    start: Start,
+    change: Vec<Vec<f64>>,
+}
+
 impl Screening {
     /// Simulates every candidate near the re-tuned nominal model in the episodes of `part`, which are those at `places` of all.
     #[must_use]
     pub fn new(part: &Study, places: Vec<usize>, nominal: &Fit, candidates: &[Candidate]) -> Self {
         let hypothesis = nominal.model.hypothesis(&nominal.x);
         let base = part.raw(&hypothesis);
-        let columns = candidates
-            .iter()
-            .map(|candidate| {
-                let change = |a: &[f64]| -> Vec<Vec<f64>> {
-                    let mut hypothesis = hypothesis.clone();
-                    hypothesis.effects.push(candidate.effect(a));
-                    let raw = part.raw(&hypothesis);
-                    let less = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - b).collect();
-                    raw.iter().zip(&base).map(less).collect()
-                };
-                let columns = match &candidate.begin {
-                    Some(begin) => Columns::Whole(change(begin)),
-                    None => Columns::Linear(
-                        candidate
-                            .strengths()
-                            .map(|index| {
-                                let mut a = vec![0.0; candidate.coordinates.len()];
-                                a[index] = reach(candidate, index);
-                                change(&a)
-                            })
-                            .collect(),
-                    ),
-                };
-                (candidate.clone(), columns)
-            })
-            .collect();
-        Self { places, columns }
+        let scanned = spread(nominal, &part.groups(), SCANNED);
+        let few = part.part(&scanned);
+        let columns = |candidate: &Candidate| {
+            let change = |a: &[f64]| -> Vec<Vec<f64>> {
+                let mut hypothesis = hypothesis.clone();
+                hypothesis.effects.push(candidate.effect(a));
+                changes(&part.raw(&hypothesis), &base)
+            };
+            match &candidate.begin {
+                Some(begin) => Columns::Whole(change(begin)),
+                None => Columns::Linear(
+                    candidate
+                        .strengths()
+                        .map(|index| {
+                            let mut a = vec![0.0; candidate.coordinates.len()];
+                            a[index] = reach(candidate, index);
+                            change(&a)
+                        })
+                        .collect(),
+                ),
+            }
+        };
+        let before: Vec<Vec<f64>> = scanned.iter().map(|place| base[*place].clone()).collect();
+        let one = |candidate: &Candidate| Screened {
+            columns: columns(candidate),
+            points: scan(&few, &before, nominal, candidate),
+            candidate: candidate.clone(),
+        };
+        let screened = candidates.iter().map(one).collect();
+        Self { places, scanned, screened }
     }
 
     /// What each candidate would bring in so many episodes beside what `fit` has; the most promising first. `part` and `fit` know the episodes of the
     /// screening alone.
     #[must_use]
     pub fn promises(&self, part: &Study, fit: &Fit, episodes: usize) -> Vec<Promise> {
-        let Fit { model, x, raw, residuals, jacobian: tuning } = fit;
-        let moved = |change: &Vec<Vec<f64>>| -> Stack {
-            let sum = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a + b).collect();
-            part.white(&raw.iter().zip(change).map(sum).collect::<Vec<_>>(), model.engine_errors(x))
+        let Fit { model, x, raw, residuals, jacobian: tuning, .. } = fit;
+        let moved = |change: &Vec<Vec<f64>>| -> Stack { part.white(&plus(raw.iter(), change), model.engine_errors(x)) };
+        let few = part.part(&self.scanned);
+        let before = cost(x, &pick(residuals, &self.scanned));
+        // Beside another effect changes are taken to add up.
+        let best = |points: &[Point]| -> Option<(f64, Start)> {
+            let gain = |point: &Point| {
+                let raw = plus(self.scanned.iter().map(|place| &raw[*place]), &point.change);
+                let mut x = x.clone();
+                x[..point.start.clocks.len()].copy_from_slice(&point.start.clocks);
+                let white = few.white(&raw, model.engine_errors(&x));
+                x.extend(&point.start.own);
+                before - cost(&x, &white)
+            };
+            let gains = points.iter().map(|point| (gain(point), point.start.clone()));
+            gains.filter(|(gain, _)| *gain > 0.0).max_by(|a, b| a.0.total_cmp(&b.0))
         };
         // What was left out says as much again.
         let share = episodes as f64 / self.places.len() as f64;
-        let mut promises: Vec<Promise> = (self.columns.iter())
-            .map(|(candidate, columns)| {
+        let share_of_few = episodes as f64 / self.scanned.len() as f64;
+        let mut promises: Vec<Promise> = (self.screened.iter())
+            .map(|Screened { candidate, columns, points }| {
                 let (gain, begin, beside) = match columns {
                     Columns::Whole(change) => {
                         let begin = candidate.begin.clone().unwrap_or_default();
@@ -116,7 +172,9 @@ impl Screening {
                         (gain, begin, beside)
                     }
                 };
-                Promise { candidate: candidate.clone(), gain: gain * share, episodes, begin, beside }
+                let (scanned, start) = best(points).map_or((0.0, None), |(gain, start)| (gain, Some(start)));
+                let gain = (gain * share).max(scanned * share_of_few);
+                Promise { candidate: candidate.clone(), gain, episodes, begin, beside, start }
             })
             .collect();
         promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -124,21 +182,72 @@ impl Screening {
     }
 }
 
+fn changes(after: &[Vec<f64>], before: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let less = |(a, b): (&Vec<f64>, &Vec<f64>)| a.iter().zip(b).map(|(a, b)| a - b).collect();
+    after.iter().zip(before).map(less).collect()
+}
+
+fn plus<'a>(before: impl Iterator<Item = &'a Vec<f64>>, change: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    before.zip(change).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
+}
+
+/// Simulates strengths of a candidate, one coordinate after another: some either way, then a weaker or a stronger one than the best, and in the end the
+/// best of all coordinates together. `before`: residuals of the nominal model.
+fn scan(few: &Study, before: &[Vec<f64>], nominal: &Fit, candidate: &Candidate) -> Vec<Point> {
+    if candidate.begin.is_some() {
+        return Vec::new();
+    }
+    let model = nominal.model.with(candidate);
+    let mut points: Vec<(f64, Point)> = Vec::new();
+    let look = |own: Vec<f64>| -> (f64, Point) {
+        let mut x = [nominal.x.as_slice(), &own].concat();
+        let (clocks, raw) = few.with_best_clocks(&model.hypothesis(&x));
+        x[..clocks.len()].copy_from_slice(&clocks);
+        let cost = cost(&x, &few.white(&raw, model.engine_errors(&x)));
+        (cost, Point { start: Start { clocks, own }, change: changes(&raw, before) })
+    };
+    let without = cost(&nominal.x, &few.white(before, nominal.model.engine_errors(&nominal.x)));
+    let mut together = vec![0.0; candidate.coordinates.len()];
+    for index in candidate.strengths() {
+        let at = |a: f64| {
+            let [low, high] = candidate.coordinates[index].range;
+            let mut own = vec![0.0; candidate.coordinates.len()];
+            own[index] = a;
+            (low..=high).contains(&a).then(|| look(own))
+        };
+        let mut own: Vec<(f64, Point)> = STRENGTHS.iter().flat_map(|a| [*a, -a]).filter_map(at).collect();
+        let best = |own: &[(f64, Point)]| -> Option<f64> {
+            let best = own.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+            (best.0 < without).then(|| best.1.start.own[index])
+        };
+        let next = match best(&own) {
+            Some(a) if a.abs() == STRENGTHS[1] => BEYOND[1].copysign(a),
+            Some(a) => BEYOND[0].copysign(a),
+            None => BEYOND[0],
+        };
+        own.extend(at(next));
+        together[index] = best(&own).unwrap_or(0.0);
+        points.extend(own);
+    }
+    if together.iter().filter(|a| **a != 0.0).count() > 1 {
+        points.push(look(together));
+    }
+    points.into_iter().map(|(_, point)| point).collect()
+}
+
 /// By how much a body in the way explains episodes better. One that neither explains says nothing: a millimetre beside its place an object that meets it
 /// may go another way, but what went by freely still has to.
 pub(crate) fn met(before: &Stack, after: &Stack) -> f64 {
-    let gain = |(before, after): (&DVector<f64>, &DVector<f64>)| {
-        let [a, b] =
-            [before, after].map(|residuals| likelihood::episode_cost(residuals.norm_squared(), residuals.len()));
-        if likelihood::explained(before) { a - b } else { (a - b).max(0.0) }
+    let gain = |(episode, (a, b)): (&DVector<f64>, (f64, f64))| {
+        if likelihood::explained(episode) { a - b } else { (a - b).max(0.0) }
     };
-    before.iter().zip(after).map(gain).sum()
+    before.iter().zip(before.costs().into_iter().zip(after.costs())).map(gain).sum()
 }
 
-/// The change of a strength that is simulated.
+/// The change of a strength by which a linear step is measured; the other way where this is beyond the range.
 fn reach(candidate: &Candidate, index: usize) -> f64 {
     let [low, high] = candidate.coordinates[index].range;
-    if (low..=high).contains(&candidate.reach) { candidate.reach } else { -candidate.reach }
+    if (low..=high).contains(&REACH) { REACH } else { -REACH }
 }
 
 /// The best of each kind, as many kinds as asked for; of what is tied to a place, or far from linear, two: a fit does not find the way from afar. Of a
@@ -152,7 +261,7 @@ pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
         let variant = promise.candidate.variant();
         let kind = variant.0;
         let before = variants.iter().filter(|other| **other == variant).count();
-        let several = matches!(kind, K::FrictionPatch | K::ContactCompliance | K::Restitution | K::Adhesion);
+        let several = matches!(kind, K::FrictionPatch | K::Restitution | K::Adhesion);
         let most = if several || promise.candidate.begin.is_some() { 2 } else { 1 };
         if before < most && (before > 0 || list.len() < count) {
             variants.push(variant);
@@ -165,21 +274,31 @@ pub fn shortlist(promises: &[Promise], count: usize) -> Vec<Promise> {
 /// Pieces of the episodes to look at, which are evenly spread over those sorted by how badly the nominal model fails them. Of those that last much longer
 /// than most only the worst may be among them: each costs as much as several others.
 pub(crate) fn places(study: &Study, nominal: &Fit) -> Vec<usize> {
-    let groups = study.groups();
-    let failure =
-        |group: &Range<usize>| nominal.residuals[group.clone()].iter().map(DVector::norm_squared).sum::<f64>();
+    let mut groups = study.groups();
     let ticks = |group: &Range<usize>| -> usize {
         group.clone().map(|place| study.simulator.trials[study.chosen[place]].ticks).sum()
     };
     let mean = groups.iter().map(ticks).sum::<usize>() as f64 / groups.len().max(1) as f64;
     let long = |group: &Range<usize>| ticks(group) as f64 > LONG * mean;
-    let mut order: Vec<usize> = (0..groups.len()).collect();
-    order.sort_by(|a, b| failure(&groups[*b]).total_cmp(&failure(&groups[*a])));
-    let worst = order.iter().copied().find(|group| long(&groups[*group]));
-    order.retain(|group| !long(&groups[*group]) || Some(*group) == worst);
+    let worst = by_failure(nominal, &groups).into_iter().find(|group| long(group));
+    groups.retain(|group| !long(group) || Some(group) == worst.as_ref());
     let most = if study.simulator.nominal.has_tool() { EPISODES } else { EPISODES_THROWN };
-    let count = order.len().min(most);
-    let mut places: Vec<usize> = (0..count).flat_map(|i| groups[order[i * order.len() / count]].clone()).collect();
+    spread(nominal, &groups, most)
+}
+
+/// Episodes sorted by how badly a model fails them, the worst first.
+fn by_failure(fit: &Fit, groups: &[Range<usize>]) -> Vec<Range<usize>> {
+    let failure = |group: &Range<usize>| fit.residuals[group.clone()].iter().map(DVector::norm_squared).sum::<f64>();
+    let mut order = groups.to_vec();
+    order.sort_by(|a, b| failure(b).total_cmp(&failure(a)));
+    order
+}
+
+/// Pieces of so many episodes, evenly spread over those sorted by how badly a model fails them.
+fn spread(fit: &Fit, groups: &[Range<usize>], count: usize) -> Vec<usize> {
+    let order = by_failure(fit, groups);
+    let count = order.len().min(count);
+    let mut places: Vec<usize> = (0..count).flat_map(|i| order[i * order.len() / count].clone()).collect();
     places.sort_unstable();
     places
 }
@@ -260,13 +379,13 @@ mod tests {
     #[test]
     fn a_linear_step_moves_what_is_re_tuned_with_the_effect() {
         // Residuals that are linear in one tunable and one strength, at no noise and with columns far above the prior: the step is exact.
-        let column = |f: fn(f64) -> f64| vec![DVector::from_fn(200, |row, _| 100.0 * f(row as f64))];
+        let column = |f: fn(f64) -> f64| Stack::from(vec![DVector::from_fn(200, |row, _| 100.0 * f(row as f64))]);
         let (tuning, strength) = (column(|t| (0.1 * t).sin()), column(|t| (0.1 * t).sin() + (0.3 * t).cos()));
         // Re-tuning alone has gone to 2, where 0.5 less and an effect of 0.7 are right.
         let residuals = vec![&tuning[0] * 0.5 - &strength[0] * 0.7];
         let damping = candidate(EffectKind::ViscousDamping);
         let strengths: Vec<usize> = damping.strengths().collect();
-        let (gain, step) = linear(&damping, &strengths, &[2.0], &residuals, &[tuning], &[strength]);
+        let (gain, step) = linear(&damping, &strengths, &[2.0], &residuals.into(), &[tuning], &[strength]);
         assert!((step[0] + 0.5).abs() < 1e-2 && (step[1] - 0.7).abs() < 1e-2, "{step:?}");
         assert!(gain > 100.0, "{gain}");
     }
@@ -279,7 +398,7 @@ mod tests {
     #[test]
     fn what_met_a_body_may_go_another_way_and_what_went_by_may_not() {
         let episode = |size: f64| DVector::from_element(50, size);
-        let gain = |before: f64, after: f64| met(&vec![episode(before)], &vec![episode(after)]);
+        let gain = |before: f64, after: f64| met(&vec![episode(before)].into(), &vec![episode(after)].into());
         // A hit that is explained, one that neither explains, and a body that stands where something went by.
         assert!(gain(5.0, 1.0) > 50.0);
         assert_eq!(gain(3.0, 5.0), 0.0);

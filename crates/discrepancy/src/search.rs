@@ -1,21 +1,24 @@
 //! The search for effects: rounds of screening, quick fits, fits with care, and a decision.
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 use physics_model::EffectKind;
 
-use crate::accept::{Asked, Episodes, NEGLIGIBLE, better_heldout, both_convince, convinces, lasts, may_convince};
-use crate::begin::{begin, follow, promise_friction, shake};
+use crate::accept::{Asked, Episodes, better_heldout, both_convince, convinces, lasts, may_convince};
 use crate::candidate::Candidate;
 use crate::chain::{LEAST_SHARE, Link};
 use crate::diagnosis::Settings;
 use crate::fit::{Begin, Effort, Fit, STEPS, fit};
-use crate::likelihood::{mean_square, trimmed_mean};
+use crate::likelihood::{Stack, mean_square, trimmed_mean};
 use crate::locate::{Cell, locate};
 use crate::model::Model;
-use crate::rival::{Rival, Round, first_of_each, of_first, sort};
-use crate::screen::{Promise, Screening, shortlist};
+use crate::rival::{Heldout, Rival, Round, first_of_each, of_first, sort};
+use crate::screen::{Promise, Screening};
 use crate::study::Study;
+use crate::trial::Kind;
 
+mod quick;
 mod retune;
 
 /// What a further effect has to gain, as a share of what those before it did; less, down to the latter, where held-out episodes gain as well. So 2 of 9 pairs of
@@ -23,11 +26,7 @@ mod retune;
 const SECOND_SHARE: f64 = 0.01;
 const LEAST_SECOND_SHARE: f64 = 0.0025;
 /// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
-const NEAR: f64 = 60.0;
-/// What promises less than this share of what another one gains is not fitted...
-const HOPELESS: f64 = 0.1;
-/// ... but for the first two kinds.
-const LEAST_KINDS: usize = 2;
+pub(crate) const NEAR: f64 = 60.0;
 /// What keeps this share of what it promised in the episodes of the screening says what others would keep.
 const MOST_KEEP: f64 = 0.5;
 /// If an effect gains more than this in ln evidence of the episodes of the screening, a model without was no place to learn errors at.
@@ -37,8 +36,10 @@ const FAR: f64 = 100.0;
 pub(crate) struct Search<'a> {
     /// Episodes that models are fitted to.
     pub(crate) study: Study<'a>,
-    /// Those held out.
+    /// Those held out, by which models are chosen.
     pub(crate) kept: Study<'a>,
+    /// Those held out for the report; `None`: the same.
+    pub(crate) reported: Option<Study<'a>>,
     /// Those of the screening, with errors learnt where re-tuning alone leads.
     pub(crate) part: Study<'a>,
     /// What it may do.
@@ -48,30 +49,69 @@ pub(crate) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Sums of squares of the held-out episodes.
-    pub(crate) fn heldout(&self, fit: &Fit) -> Vec<f64> {
+    /// What a model leaves of the held-out episodes.
+    pub(crate) fn heldout(&self, fit: &Fit) -> Heldout {
+        let white = self.heldout_residuals(fit);
+        Heldout { squares: white.iter().map(DVector::norm_squared).collect(), costs: white.costs() }
+    }
+
+    /// Residuals of the held-out episodes.
+    fn heldout_residuals(&self, fit: &Fit) -> Stack {
         let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
-        self.kept.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
+        self.kept.white(&raw, fit.model.engine_errors(&fit.x))
+    }
+
+    /// Error of a kind in the held-out episodes, as a share of what it does there: root mean squares, both in its unit. 0 without such readings.
+    pub(crate) fn heldout_share(&self, raw: &[Vec<f64>], kind: Kind) -> f64 {
+        let (mut error, mut signal) = (0.0, 0.0);
+        for (index, raw) in self.kept.chosen.iter().zip(raw) {
+            let trial = &self.study.simulator.trials[*index];
+            let Some(does) = trial.signal(kind) else { continue };
+            let errors = trial.errors(raw);
+            let squares = errors.iter().filter(|(of, _)| *of == kind).map(|(_, error)| error * error);
+            let count = squares.clone().count();
+            error += squares.sum::<f64>() / count.max(1) as f64;
+            signal += does;
+        }
+        if signal > 0.0 { (error / signal).sqrt() } else { 0.0 }
+    }
+
+    /// Mean square of such residuals in each held-out episode, as far as they are of some kinds; of those episodes that have any.
+    pub(crate) fn heldout_errors(&self, stack: &Stack, episodes: &Episodes, of: &dyn Fn(Kind) -> bool) -> Vec<f64> {
+        let one = |group: &Range<usize>| {
+            let (mut square, mut count) = (0.0, 0_usize);
+            for place in group.clone() {
+                let blocks = &self.study.simulator.trials[self.kept.chosen[place]].blocks;
+                for (_, residual) in blocks.iter().zip(stack[place].iter()).filter(|(block, _)| of(block.kind)) {
+                    square += residual * residual;
+                    count += 1;
+                }
+            }
+            (count > 0).then(|| square / count as f64)
+        };
+        episodes.heldout.iter().filter_map(one).collect()
+    }
+
+    /// Held-out episodes of the report.
+    pub(crate) fn reported(&self) -> &Study<'_> {
+        self.reported.as_ref().unwrap_or(&self.kept)
     }
 
     /// Adds effects to the nominal model, as re-tuned in the episodes of the screening, as long as one convinces and what it leaves stands out or another one
-    /// promises enough; the model with them, what was compared, and what the model leaves where that is known.
-    pub(crate) fn effects(
-        &mut self,
-        screening: &Screening,
-        null: &Fit,
-        episodes: &Episodes,
-    ) -> (Fit, Vec<Round>, Option<Vec<Cell>>) {
+    /// promises enough; the model with them, and what was compared.
+    pub(crate) fn effects(&mut self, screening: &Screening, null: &Fit, episodes: &Episodes) -> (Fit, Vec<Round>) {
         let settings = self.settings;
-        let (mut accepted, mut rounds, mut explained, mut remaining) = (null.clone(), Vec::new(), 0.0, None);
-        let within = |search: &Self| search.study.simulator.rollouts() <= settings.rollouts;
+        let (mut accepted, mut rounds, mut explained) = (null.clone(), Vec::new(), 0.0);
+        let within = |search: &Self| search.study.has_rounds();
         let mut links = if settings.effects > 2 { self.chain(screening, null) } else { Vec::new() };
         if let Some((accepted, rounds)) = self.together(screening, null, &links, episodes) {
-            return (accepted, rounds, None);
+            return (accepted, rounds);
         }
         links.truncate(1);
         while rounds.is_empty() || (accepted.model.parts.len() < settings.effects && within(self)) {
-            let mut round = self.round(screening, &accepted, links.pop());
+            let compared = rounds.last().map_or_else(Vec::new, Round::fits);
+            let known = links.pop().unwrap_or_else(|| self.beside(screening, &accepted, &compared));
+            let mut round = self.round(screening, &accepted, known);
             let mut found = settings.effects > 0 && self.choose(&mut round, episodes, explained);
             if !found && round.hasty {
                 if let Some(pair) = self.both(screening, &mut round, episodes) {
@@ -87,7 +127,6 @@ impl Search<'_> {
             explained += round.rivals.first().map_or(0.0, |best| best.gain);
             rounds.push(round);
             if !found {
-                remaining = None;
                 break;
             }
             // A third one is worth more than to ask which two it was.
@@ -99,7 +138,6 @@ impl Search<'_> {
             }
             let cells = self.left(&accepted);
             let another = self.stands_out(&cells) || self.promised(screening, &accepted) > self.asked(explained).least;
-            remaining = Some(cells);
             if !another {
                 break;
             }
@@ -112,9 +150,8 @@ impl Search<'_> {
             self.compare(screening, first);
             let found = self.choose(first, episodes, 0.0);
             accepted = first.best(found).clone();
-            remaining = None;
         }
-        (accepted, rounds, remaining)
+        (accepted, rounds)
     }
 
     /// Drops the rivals before the best one that convinces beside effects that gained so much, and says whether one does.
@@ -139,11 +176,12 @@ impl Search<'_> {
     fn both(&mut self, screening: &Screening, round: &mut Round, episodes: &Episodes) -> Option<Round> {
         let (asked, seed) = (self.asked(0.0), self.settings.seed);
         let first = round.rivals.iter().position(|rival| may_convince(rival, episodes, asked, seed))?;
-        if self.settings.effects < 2 || self.study.simulator.rollouts() > self.settings.rollouts {
+        if self.settings.effects < 2 || !self.study.has_rounds() {
             return None;
         }
         let Rival { fit, gain, .. } = round.rivals[first].clone();
-        let mut second = self.round(screening, &fit, None);
+        let known = self.beside(screening, &fit, &round.fits());
+        let mut second = self.round(screening, &fit, known);
         if !self.choose(&mut second, episodes, gain) || !both_convince([round, &second], episodes, asked) {
             return None;
         }
@@ -209,7 +247,7 @@ impl Search<'_> {
             let more = fit.log_evidence() - pair.fit.log_evidence();
             others[index].gain = lead.gain + more;
             if more > 0.0
-                && better_heldout(&heldout, &pair.heldout, episodes)
+                && better_heldout(&heldout, &pair.heldout)
                 && lasts(&fit, &episodes.fitted, self.settings.seed)
             {
                 *pair = Rival { heldout, gain: pair.gain, fit, whole: true };
@@ -230,17 +268,18 @@ impl Search<'_> {
 
     /// Whether a quick fit of a model to the episodes of a study is within the budget.
     pub(crate) fn affords(&self, study: &Study, model: &Model) -> bool {
-        self.study.simulator.affords((model.simulated() + STEPS + 1) * study.rollouts())
+        self.study.affords((model.simulated() + STEPS + 1) * study.rollouts())
     }
 
     /// Whether it is, and after it one to all episodes.
-    fn affords_both(&self, part: &Study, model: &Model) -> bool {
+    pub(crate) fn affords_both(&self, part: &Study, model: &Model) -> bool {
         let rollouts = part.rollouts() + self.study.rollouts();
-        self.study.simulator.affords((model.simulated() + STEPS + 1) * rollouts + self.reserve)
+        self.study.affords((model.simulated() + STEPS + 1) * rollouts + self.reserve)
     }
 
     /// What a model leaves, by channel and phase.
     fn left(&self, fit: &Fit) -> Vec<Cell> {
+        self.study.charge();
         locate(self.study.simulator, &self.study.chosen, fit, self.settings.seed)
     }
 
@@ -269,21 +308,28 @@ impl Search<'_> {
         promises
     }
 
-    /// Compares what could be added to `base`, which in the first round knows the episodes of the screening alone. `known`: what those say already.
-    fn round(&mut self, screening: &Screening, base: &Fit, known: Option<Link>) -> Round {
+    /// What the episodes of the screening say of what could be added to `base`, beside which `compared` was looked at before.
+    fn beside(&self, screening: &Screening, base: &Fit, compared: &[Fit]) -> Link {
+        if base.model.parts.is_empty() {
+            return self.link(screening, &self.part, base, compared);
+        }
+        self.link(screening, &self.study.part(&screening.places), &base.part(&screening.places), compared)
+    }
+
+    /// Compares in all episodes what could be added to `base`, which in the first round knows those of the screening alone. `link`: what these say.
+    fn round(&mut self, screening: &Screening, base: &Fit, link: Link) -> Round {
         let first = base.model.parts.is_empty();
-        let part = if first { self.part.clone() } else { self.study.part(&screening.places) };
-        let begin = if first { base.clone() } else { base.part(&screening.places) };
-        let Link { promises, mut quick, .. } = known.unwrap_or_else(|| self.link(screening, &part, &begin));
+        let Link { promises, mut quick, base: begin, .. } = link;
         let before = begin.log_evidence();
         let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
-        of_first(&mut quick, self.settings.fits, added_kind);
+        let kinds = if first { self.settings.quick_fits } else { self.settings.fits };
+        of_first(&mut quick, kinds, added_kind);
         let first_kind = quick.first().and_then(added_kind);
         let lead = quick.first().map_or(0.0, Fit::log_evidence);
         let without = base.log_evidence();
         let share = self.share(screening);
         // Where the best alone leaves much of the episodes of the screening, a second effect is the question, not by how much the first one leads.
-        let hasty = first && quick.first().is_some_and(|best| leaves_much(best, &part, self.settings));
+        let hasty = first && quick.first().is_some_and(|best| leaves_much(best, &self.part, self.settings));
         let effort = if hasty { Effort::Quick } else { Effort::Full };
         let fully = |quick: Fit| -> Rival {
             if !self.affords(&self.study, &quick.model) {
@@ -307,7 +353,7 @@ impl Search<'_> {
             .map(|(rank, quick)| {
                 // Those far behind need no exact optimum: what they gain in the episodes of the screening they gain in all.
                 let gain = quick.log_evidence();
-                let affordable = !alone && self.study.simulator.rollouts() < self.settings.rollouts;
+                let affordable = !alone && self.study.has_rounds();
                 // Whether a body in the way moves is seen where it is met, which may be in few episodes.
                 let near = lead - gain < NEAR || added_kind(&quick) == first_kind;
                 if rank == 0 || (near && affordable) {
@@ -379,71 +425,8 @@ impl Search<'_> {
         let hypothesis = right.model.hypothesis(&right.x);
         self.study.learn_errors(&hypothesis);
         self.kept.learn_errors(&hypothesis);
+        self.reported.iter_mut().for_each(|reported| reported.learn_errors(&hypothesis));
     }
-
-    /// Fits what promises most to the episodes of the screening, which `part` and `base` know alone; the best first.
-    pub(crate) fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
-        let before = base.log_evidence();
-        let share = self.share(screening);
-        let (mut quick, mut gained, mut kinds) = (Vec::<Fit>::new(), 0.0_f64, Vec::new());
-        for (promise, begun) in self.begun(part, base, promises) {
-            let (kind, model) = (promise.candidate.kind(), base.model.with(&promise.candidate));
-            let hopeless = kinds.len() >= LEAST_KINDS && promise.gain < HOPELESS * share * gained;
-            // The best one has to be fitted to all episodes, too.
-            if (hopeless && !kinds.contains(&kind)) || !self.affords_both(part, &model) {
-                continue;
-            }
-            if !kinds.contains(&kind) {
-                kinds.push(kind);
-            }
-            let begin = begun.unwrap_or_else(|| begin(part, base, &model, &promise));
-            let fit = fit(part, model, begin, Effort::Quick);
-            gained = gained.max(fit.log_evidence() - before);
-            quick.push(fit);
-        }
-        quick.retain(|fit| fit.log_evidence().is_finite() && is_there(fit));
-        let sort = |fits: &mut Vec<Fit>| fits.sort_by(|a, b| b.log_evidence().total_cmp(&a.log_evidence()));
-        sort(&mut quick);
-        // Half or one and a half times as strong an effect may lie beyond a ridge that no descent crosses.
-        let within = |fit: &Fit| self.affords_both(part, &fit.model);
-        if let Some(best) = quick.first_mut().filter(|best| within(best)) {
-            shake(part, best);
-        }
-        // Twins (a tilt and a force) reach the same optimum or neither: one that was found is where the other begins.
-        if let Some(best) = quick.first().cloned() {
-            quick.iter_mut().skip(1).filter(|other| within(other)).for_each(|other| follow(part, &best, other));
-            sort(&mut quick);
-        }
-        // Of one kind's several places the best.
-        first_of_each(&mut quick, |fit| fit.model.parts.last().map(Candidate::variant));
-        quick
-    }
-
-    /// What promises most. Beside another effect, which may have gone some of the way, a linear step says less than what is simulated where a fit begins.
-    fn begun(&self, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<(Promise, Option<Begin>)> {
-        if base.model.parts.is_empty() {
-            let promises = promise_friction(part, base, promises);
-            return shortlist(&promises, self.settings.quick_fits).into_iter().map(|promise| (promise, None)).collect();
-        }
-        let mut list = Vec::new();
-        for promise in shortlist(promises, self.settings.begins) {
-            let model = base.model.with(&promise.candidate);
-            if self.affords_both(part, &model) {
-                let begin = begin(part, base, &model, &promise);
-                list.push((begin.cost(part, &model), promise, begin));
-            }
-        }
-        list.sort_by(|a, b| a.0.total_cmp(&b.0));
-        of_first(&mut list, self.settings.fits, |(_, promise, _)| promise.candidate.kind());
-        list.into_iter().map(|(_, promise, begin)| (promise, Some(begin))).collect()
-    }
-}
-
-/// Whether a fit's last effect is more than negligible: what is as good as absent lasts nowhere, and is not worth a fit with care.
-fn is_there(fit: &Fit) -> bool {
-    let Some(part) = fit.model.parts.last() else { return false };
-    let own = &fit.x[fit.x.len() - part.coordinates.len()..];
-    part.begin.is_some() || part.strengths().any(|index| own[index].abs() > NEGLIGIBLE)
 }
 
 /// Kind of a fit's last effect.

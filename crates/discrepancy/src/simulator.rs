@@ -1,5 +1,6 @@
 //! Hypotheses against measured episodes: residuals by simulation.
 
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -9,9 +10,11 @@ use physics_model::world::Wrench;
 use physics_model::{BodyState, EffectConfig, EffectKind};
 use rayon::prelude::*;
 
+use crate::cells::{Key, key};
+use crate::clock::{Clock, skewed};
 use crate::nominal::{Engine, Nominal};
 use crate::progress::Progress;
-use crate::trial::{Trial, WHOLE};
+use crate::trial::{Block, Trial, WHOLE};
 
 /// A bounce is over within a step of a slow push: it needs this many times as many.
 const BOUNCE_REFINEMENT: u32 = 3;
@@ -48,8 +51,10 @@ pub struct Simulator<'a> {
     /// The episodes.
     pub trials: &'a [Trial],
     simulated: AtomicUsize,
-    /// Simulated episodes after which fits end where they are, and which none of their simulations exceeds.
-    budget: [usize; 2],
+    /// Of each episode, what was compared last, with each clock a step away: that takes no simulation.
+    ahead: Vec<Mutex<Vec<Ahead>>>,
+    /// Simulated episodes that all stages may come to, for those who wait.
+    limit: usize,
     progress: &'a dyn Progress,
 }
 
@@ -57,37 +62,20 @@ impl<'a> Simulator<'a> {
     /// Of the episodes of a log.
     #[must_use]
     pub fn new(nominal: &'a Nominal, trials: &'a [Trial]) -> Self {
-        Self { nominal, trials, simulated: AtomicUsize::new(0), budget: [usize::MAX; 2], progress: &() }
+        let ahead = trials.iter().map(|_| Mutex::default()).collect();
+        Self { nominal, trials, simulated: AtomicUsize::new(0), ahead, limit: usize::MAX, progress: &() }
     }
 
-    /// With a number of simulated episodes after which fits end where they are, and one that they never exceed.
+    /// Before the eyes of somebody who wants to know how far it is, of so many simulated episodes at most.
     #[must_use]
-    pub fn with_budget(self, budget: [usize; 2]) -> Self {
-        Self { budget, ..self }
-    }
-
-    /// Before the eyes of somebody who wants to know how far it is.
-    #[must_use]
-    pub fn watched_by(self, progress: &'a dyn Progress) -> Self {
-        Self { progress, ..self }
+    pub fn watched_by(self, progress: &'a dyn Progress, limit: usize) -> Self {
+        Self { progress, limit, ..self }
     }
 
     /// Says what begins.
     pub(crate) fn stage(&self, stage: &'static str) {
-        self.progress.simulated(self.rollouts(), self.budget[1]);
+        self.progress.simulated(self.rollouts(), self.limit);
         self.progress.stage(stage);
-    }
-
-    /// Whether the budget is used up.
-    #[must_use]
-    pub fn exhausted(&self) -> bool {
-        self.rollouts() >= self.budget[0]
-    }
-
-    /// Whether so many more simulated episodes are within the budget.
-    #[must_use]
-    pub fn affords(&self, count: usize) -> bool {
-        self.rollouts() + count <= self.budget[1]
     }
 
     /// Episodes simulated so far; pieces of one count in proportion to their durations.
@@ -105,10 +93,20 @@ impl<'a> Simulator<'a> {
     /// Residuals of the episodes `chosen` (see [`Trial::residuals`]), in parallel; the order is that of `chosen`.
     #[must_use]
     pub fn residuals(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, chosen: &[usize]) -> Vec<Vec<f64>> {
-        chosen.par_iter().map(|index| self.episode(hypothesis, engine, nudge, &self.trials[*index])).collect()
+        chosen.par_iter().map(|index| self.episode(hypothesis, engine, nudge, *index)).collect()
     }
 
-    /// Simulated readings of an episode, the start first.
+    /// Whether the residuals of all episodes `chosen` are known: a clock differs from what was simulated last.
+    pub(crate) fn is_ahead(&self, hypothesis: &Hypothesis, chosen: &[usize]) -> bool {
+        self.nominal.clocks() > 0 && chosen.iter().all(|index| self.known(hypothesis, *index).is_some())
+    }
+
+    fn known(&self, hypothesis: &Hypothesis, index: usize) -> Option<Vec<f64>> {
+        let ahead = self.ahead[index].lock().ok()?;
+        ahead.iter().find(|known| known.hypothesis == *hypothesis).map(|known| known.residuals.clone())
+    }
+
+    /// Simulated readings of an episode, the start first, as their clocks stamp them.
     #[must_use]
     pub fn readings(
         &self,
@@ -117,12 +115,36 @@ impl<'a> Simulator<'a> {
         nudge: Nudge,
         trial: &Trial,
     ) -> (RigReading, Vec<RigReading>) {
+        let (first, readings) = self.run(hypothesis, engine, nudge, trial);
+        let readings = self.stamped(hypothesis, &first, readings);
+        (first, readings)
+    }
+
+    fn stamped(&self, hypothesis: &Hypothesis, first: &RigReading, readings: Vec<RigReading>) -> Vec<RigReading> {
+        let effects = self.nominal.effects.iter().chain(&hypothesis.effects);
+        let skews_secs = self.nominal.skews_secs(&hypothesis.z, effects);
+        if skews_secs == [0.0; 2] || readings.is_empty() {
+            return readings;
+        }
+        skewed(&readings, first, skews_secs, self.nominal.header().period_secs)
+    }
+
+    /// The same by a clock without skew.
+    fn run(
+        &self,
+        hypothesis: &Hypothesis,
+        engine: &Engine,
+        nudge: Nudge,
+        trial: &Trial,
+    ) -> (RigReading, Vec<RigReading>) {
         self.simulated.fetch_add(trial.share, Ordering::Relaxed);
-        self.progress.simulated(self.rollouts(), self.budget[1]);
+        self.progress.simulated(self.rollouts(), self.limit);
         let configs = || self.nominal.effects.iter().chain(&hypothesis.effects);
         let bounces = configs().any(|effect| effect.kind() == EffectKind::Restitution) && self.nominal.has_tool();
         let engine = &Engine { refinement: engine.refinement * if bounces { BOUNCE_REFINEMENT } else { 1 }, ..*engine };
-        let rig = self.nominal.rig(&hypothesis.z, engine);
+        // A contact that damps less bounces as well: beside a restitution contacts are the model's.
+        let own = bounces.then(|| self.nominal.with_own_contacts(&hypothesis.z));
+        let rig = self.nominal.rig(own.as_deref().unwrap_or(&hypothesis.z), engine);
         let object = self.nominal.object(&hypothesis.z, trial.added_mass_kg, engine);
         let effects: Vec<Box<dyn Effect>> = configs().map(EffectConfig::build).collect();
         let body = nudged(&trial.start, &trial.start_stddev, nudge);
@@ -146,10 +168,64 @@ impl<'a> Simulator<'a> {
         (first, readings)
     }
 
-    fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, trial: &Trial) -> Vec<f64> {
-        let (first, readings) = self.readings(hypothesis, engine, nudge, trial);
-        trial.residuals(&first, &readings)
+    /// The same with the key of each residual's block, by what goes on in the simulated episode.
+    pub(crate) fn cells(
+        &self,
+        hypothesis: &Hypothesis,
+        engine: &Engine,
+        chosen: &[usize],
+    ) -> Vec<(Vec<Key>, Vec<f64>)> {
+        let (rolls, gravity_mps2) = (self.nominal.rolls(), self.nominal.header().gravity_mps2);
+        let one = |index: &usize| {
+            let trial = &self.trials[*index];
+            let (first, readings) = self.readings(hypothesis, engine, Nudge::default(), trial);
+            let phases = trial.phases(&readings, rolls, gravity_mps2);
+            let middle = |block: &Block| phases[usize::midpoint(block.first, block.end - 1)];
+            (trial.blocks.iter().map(|block| key(block, middle(block))).collect(), trial.residuals(&first, &readings))
+        };
+        chosen.par_iter().map(one).collect()
     }
+
+    /// Residuals of the episode at `index` with each clock by itself all along its grid, by one simulation: clock, place on the grid, residuals.
+    pub(crate) fn scanned(&self, hypothesis: &Hypothesis, engine: &Engine, index: usize) -> Vec<Vec<Vec<f64>>> {
+        let trial = &self.trials[index];
+        let (first, readings) = self.run(hypothesis, engine, Nudge::default(), trial);
+        let at = |clock: usize, z: f64| {
+            let mut hypothesis = hypothesis.clone();
+            hypothesis.z[clock] = z;
+            trial.residuals(&first, &self.stamped(&hypothesis, &first, readings.clone()))
+        };
+        let all = |clock: usize| Clock::ALL[clock].grid().into_iter().map(|z| at(clock, z)).collect();
+        (0..self.nominal.clocks()).map(all).collect()
+    }
+
+    fn episode(&self, hypothesis: &Hypothesis, engine: &Engine, nudge: Nudge, index: usize) -> Vec<f64> {
+        let (trial, clocks) = (&self.trials[index], self.nominal.clocks());
+        let plain = clocks > 0 && nudge == Nudge::default() && *engine == self.nominal.engine();
+        if plain && let Some(known) = self.known(hypothesis, index) {
+            return known;
+        }
+        let (first, readings) = self.run(hypothesis, engine, nudge, trial);
+        let residuals = |hypothesis: &Hypothesis, readings: Vec<RigReading>| {
+            trial.residuals(&first, &self.stamped(hypothesis, &first, readings))
+        };
+        if plain && let Ok(mut ahead) = self.ahead[index].lock() {
+            ahead.clear();
+            ahead.extend((0..clocks).map(|clock| {
+                let mut hypothesis = hypothesis.clone();
+                hypothesis.z[clock] += Clock::ALL[clock].step(hypothesis.z[clock]);
+                Ahead { residuals: residuals(&hypothesis, readings.clone()), hypothesis }
+            }));
+        }
+        residuals(hypothesis, readings)
+    }
+}
+
+/// Residuals of an episode that were not asked for yet.
+#[derive(Debug)]
+struct Ahead {
+    hypothesis: Hypothesis,
+    residuals: Vec<f64>,
 }
 
 fn nudged(start: &BodyState, stddev: &[f64; 4], nudge: Nudge) -> BodyState {

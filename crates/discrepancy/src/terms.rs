@@ -12,6 +12,7 @@ use crate::fit::Fit;
 use crate::replay::Replay;
 use crate::simulator::Simulator;
 use crate::trial::Window;
+use crate::units::Units;
 
 mod library;
 
@@ -206,8 +207,13 @@ fn between_episodes(episodes: &[&Vec<Window>], terms: &[Term], values: &[f64], m
     ((between - (episodes.len() * middle.axes) as f64 * within) / (total + within).max(1e-300)).clamp(0.0, 1.0)
 }
 
+fn in_units(mut coefficients: Vec<Coefficient>, units: &Units) -> Vec<Coefficient> {
+    coefficients.iter_mut().for_each(|coefficient| coefficient.value *= units.factor(coefficient.unit));
+    coefficients
+}
+
 /// What is lacking, and what it follows; `None` where too little moves to say. `episodes`: the windows of each.
-fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
+fn describe(episodes: &[Vec<Window>], axes: usize, units: &Units) -> Option<LackingForce> {
     let episodes: Vec<&Vec<Window>> = episodes.iter().filter(|windows| !windows.is_empty()).collect();
     let all = || episodes.iter().flat_map(|windows| windows.iter());
     let count = all().count();
@@ -267,17 +273,18 @@ fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
             first += width;
             (*share > LEAST_SHARE).then(|| FoundTerm {
                 name: term.name(),
-                description: term.description(),
+                description: term.in_units(units).description(),
                 share: *share,
-                coefficients: term.coefficients(own, &middle),
+                coefficients: in_units(term.coefficients(own, &middle), units),
             })
         })
         .collect();
-    let root = |mean_square: f64| (mean_square * axes as f64).sqrt();
+    let newton = units.factor("N");
+    let root = |mean_square: f64| newton * (mean_square * axes as f64).sqrt();
     Some(LackingForce {
         windows: count,
         episodes: episodes.len(),
-        root_mean_square_n: (squares.iter().sum::<f64>() / count as f64).sqrt(),
+        root_mean_square_n: newton * (squares.iter().sum::<f64>() / count as f64).sqrt(),
         noise_n: root(mean(&|window| window.variance_n2)),
         explained_share: shares.iter().sum(),
         between_episodes_share: between_episodes(&episodes, &terms, values.as_slice(), &middle),
@@ -286,7 +293,13 @@ fn describe(episodes: &[Vec<Window>], axes: usize) -> Option<LackingForce> {
 }
 
 /// What force a fit lacks in replayed episodes; `None` where too little moves to say.
-pub(crate) fn lacking_force(simulator: &Simulator, fit: &Fit, episodes: &[Vec<Replay>]) -> Option<LackingForce> {
+/// In units of which `units` says how much one of today's is.
+pub(crate) fn lacking_force(
+    simulator: &Simulator,
+    fit: &Fit,
+    episodes: &[Vec<Replay>],
+    units: &Units,
+) -> Option<LackingForce> {
     let nominal = simulator.nominal;
     let hypothesis = fit.model.hypothesis(&fit.x);
     let engine = nominal.engine();
@@ -301,7 +314,7 @@ pub(crate) fn lacking_force(simulator: &Simulator, fit: &Fit, episodes: &[Vec<Re
         trial.windows(start, readings, &phases, mass_kg, friction_n)
     };
     let episodes: Vec<Vec<Window>> = episodes.iter().map(|pieces| pieces.iter().flat_map(windows).collect()).collect();
-    describe(&episodes, if nominal.has_tool() { 2 } else { 3 })
+    describe(&episodes, if nominal.has_tool() { 2 } else { 3 }, units)
 }
 
 #[cfg(test)]

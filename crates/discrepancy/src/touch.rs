@@ -8,6 +8,7 @@ use statrs::statistics::{Data, OrderStatistics as _};
 
 use crate::replay::Replay;
 use crate::trial::Touch;
+use crate::units::Units;
 
 /// It is told if this share of the square of the force's error lies there.
 const TOLD: f64 = 0.25;
@@ -54,6 +55,14 @@ pub struct Onset {
 }
 
 impl ContactGap {
+    /// In units of which `units` says how much one of today's is.
+    pub(crate) fn in_units(mut self, units: &Units) -> Self {
+        if let Some(onset) = &mut self.onset {
+            onset.after_m = onset.after_m.map(|way| units.factor("m") * way);
+        }
+        self
+    }
+
     /// How contacts begin apart, if that is much of what is left, and where: three quarters of the episodes to the same side. The few readings of an impact may hold much of a square,
     /// too, a reading earlier or later.
     fn told(&self) -> Option<(Onset, Part)> {

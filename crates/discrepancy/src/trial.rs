@@ -163,7 +163,14 @@ impl Trial {
             let start = start::start(&part, noise);
             let whole = start.and_then(|start| Self::begun(log, &part, noise, has_tool, start));
             let weight = (0..episode.rows()).find_map(|row| episode.get(Channel::AddedMass, row));
-            return whole.map(|whole| Self { added_mass_kg: weight.unwrap_or(0.0), ..whole }).into_iter().collect();
+            // A clock may start anywhere.
+            let zero_secs = episode.time_secs.first().copied().unwrap_or(0.0);
+            let of_episode = |whole: Self| Self {
+                added_mass_kg: weight.unwrap_or(0.0),
+                begin_secs: if has_tool { whole.begin_secs - zero_secs } else { 0.0 },
+                ..whole
+            };
+            return whole.map(of_episode).into_iter().collect();
         }
         shared(pieces)
     }
@@ -192,7 +199,7 @@ impl Trial {
         if ticks == 0 {
             return None;
         }
-        let commands = start::commands(episode, begin_secs, period_secs, ticks);
+        let commands = start::commands(episode, noise, begin_secs, period_secs, ticks);
         if has_tool && commands.is_none() {
             return None;
         }
@@ -297,6 +304,22 @@ impl Trial {
             }
         }
         residuals
+    }
+
+    /// Mean square of what the readings of a kind do in the episode, in the square of its unit: of places how far they are from the first, of others how
+    /// large they are. `None` without such readings.
+    pub(crate) fn signal(&self, kind: Kind) -> Option<f64> {
+        let place = matches!(kind, Kind::ObjectPosition | Kind::ToolPosition | Kind::JointPosition);
+        let (mut square, mut count) = (0.0, 0_usize);
+        for scalar in self.scalars.iter().filter(|scalar| scalar.kind == kind) {
+            let mut read = scalar.values.iter().flatten();
+            let from = if place { read.clone().next().copied().unwrap_or(0.0) } else { 0.0 };
+            read.by_ref().for_each(|value| {
+                square += (value - from).powi(2);
+                count += 1;
+            });
+        }
+        (count > 0).then(|| square / count as f64)
     }
 
     /// What standardised residuals are in the unit of their channel: the mean of (measured − simulated) over each block.

@@ -1,146 +1,167 @@
-//! What to call it: an effect, nothing, or something that the catalogue has not.
+//! What to call it, and which model to keep: an effect, nothing, or something that the catalogue has not.
 
-use std::ops::Range;
-
-use crate::diagnosis::{Diagnosis, Settings};
-use crate::likelihood::{NOISE_FLOOR, mean_square, trimmed_mean};
+use crate::decision::{Decision, Probabilities};
+use crate::findings::Findings;
+use crate::fit::Fit;
+use crate::likelihood::NOISE_FLOOR;
+use crate::model::Model;
 use crate::report::Verdict;
+use crate::rival::Round;
 
-/// A model that closes more of the gap than this explains it, whatever the solver's errors leave.
-const CLOSED: f64 = 0.95;
-
-/// The same where what is left is small.
-const NEARLY_CLOSED: f64 = 0.9;
-
-/// A mean square that nothing explains, whatever share of the gap is closed: of 1200 logs in which an effect was named rightly none had 3.
-const HOPELESS: f64 = 10.0;
-
-/// What closes less than this of the held-out gap comes near nothing.
-const LEAST_CLOSED: f64 = 0.2;
-
-/// An effect that closes less than this of a gap stands for something else.
-const HALF: f64 = 0.5;
-/// Odd episodes that go their own way, each another one, as fast contacts do in another engine, are no missing effect: what is left has to stand out, if it can.
-/// In the 28 fitted episodes of a log of 40 all that the catalogue does not have did; in 11 a weak magnet did not.
-const LEAST_TO_STAND_OUT: usize = 20;
-/// In fewer episodes than this a gap may be chance.
-const LEAST_GAPS: usize = 3;
-
-/// Held-out mean squares under the re-tuned nominal and the accepted model.
-pub(crate) fn heldout_errors(diagnosis: &Diagnosis) -> [f64; 2] {
-    let count = diagnosis.heldout_counts.iter().sum::<usize>().max(1) as f64;
-    diagnosis.heldout.each_ref().map(|sums| sums.iter().sum::<f64>() / count)
-}
+/// An unknown gap is shown with the nearest effect if that is right with this probability or more.
+const WORTH_TELLING: f64 = 0.2;
 
 pub(crate) fn closed_fraction(before: f64, after: f64) -> f64 {
     let gap = before - NOISE_FLOOR;
     if gap > 0.0 { ((before - after) / gap).min(1.0) } else { 1.0 }
 }
 
-/// The verdict, and why it is `unknown`.
-pub(crate) fn verdict(diagnosis: &Diagnosis, settings: &Settings) -> (Verdict, Option<String>) {
-    let [before, after] = heldout_errors(diagnosis);
-    let closed_fraction = closed_fraction(before, after);
-    let parts = &diagnosis.model.model.parts;
-    let left = trimmed_mean(diagnosis.mean_squares.clone());
-    let heldout = diagnosis.heldout_episodes.iter().map(|(_, before, after)| [*before, *after]);
-    let of_models = |group: &Range<usize>| {
-        [&diagnosis.nominal, &diagnosis.model].map(|fit| mean_square(&fit.residuals[group.clone()]))
-    };
-    let fitted = diagnosis.pieces.iter().map(of_models);
-    // A body in the way shows in the episodes that meet it, whatever the others lack.
-    let everywhere = parts.iter().any(|part| part.begin.is_none());
-    // Of what was fitted, where the gap is plain: a cause that few episodes meet need not show in those held out.
-    let chance = diagnosis.remaining.iter().map(|cell| cell.p_value).fold(1.0, f64::min);
-    let few = diagnosis.pieces.len() < LEAST_TO_STAND_OUT;
-    let shows = chance < settings.another || (few && closed_fraction < NEARLY_CLOSED);
-    let odd = diagnosis.heldout_episodes.iter().map(|(_, _, after)| *after).fold(0.0, f64::max);
-    let reason = if let Some(reason) = is_left(left, chance, closed_fraction, settings) {
-        Some(reason)
-    } else if everywhere && shows && stands_for_another(before, heldout, fitted, settings) {
-        Some("the nearest effect closes less than half of the gap in a typical episode".into())
-    } else if parts.is_empty() && odd > settings.odd {
-        Some(format!("one held-out episode has a mean square of {odd:.1}; noise alone gives 1"))
-    } else {
-        None
-    };
-    let verdict = match (&reason, parts.is_empty()) {
-        (Some(_), _) => Verdict::Unknown,
-        (None, true) => Verdict::None,
-        (None, false) => Verdict::Effect,
-    };
-    (verdict, reason)
+/// What was decided.
+#[derive(Clone, Debug)]
+pub(crate) struct Decided {
+    pub(crate) verdict: Verdict,
+    /// Of the effects that were compared for the first place, of nothing and of something else.
+    pub(crate) probabilities: Probabilities,
+    /// That each effect of the model is right.
+    pub(crate) confidences: Vec<f64>,
+    /// The model to keep.
+    pub(crate) model: Fit,
+    /// Whether that was fitted to the episodes of the screening alone.
+    pub(crate) in_part: bool,
+    /// Why it is `unknown`.
+    pub(crate) reason: Option<String>,
 }
 
-/// Why what a model leaves is no noise, if it is none: much in most episodes, or little that all have in the same channel and phase, with this chance of standing
-/// out under a right model.
-fn is_left(trimmed_mean: f64, chance: f64, closed_fraction: f64, settings: &Settings) -> Option<String> {
-    let much = trimmed_mean > settings.unexplained && closed_fraction < CLOSED;
-    if much || trimmed_mean > HOPELESS {
-        return Some(format!("most episodes still have a mean square of about {trimmed_mean:.2}; noise alone gives 1"));
+/// Decides from what a search accepted and compared. `findings`: what speaks for the rivals of each round, the first of which stands for the log.
+pub(crate) fn decide(decision: &Decision, accepted: Fit, rounds: &[Round], findings: &[Vec<Findings>]) -> Decided {
+    let each: Vec<Probabilities> = findings.iter().map(|round| decision.probabilities(round)).collect();
+    let probabilities = each[0].clone();
+    let verdict = probabilities.verdict();
+    let (name, probability) = probabilities.best();
+    let told = match verdict {
+        Verdict::Effect => true,
+        Verdict::Unknown => probability >= WORTH_TELLING,
+        Verdict::None => false,
+    };
+    let (mut model, in_part) = match rounds[0].rival(name) {
+        // Several that were found at once hide each other: alone another one may look better.
+        _ if told && found_at_once(&accepted.model, rounds) => (accepted, false),
+        Some(_) if told && has(&accepted.model, name) => (accepted, false),
+        Some(rival) if told => (rival.fit.clone(), !rival.whole),
+        _ => (rounds[0].base.clone(), false),
+    };
+    // A further effect is named by the rule of the first; several that were found at once stand or fall together.
+    let further = |model: &Fit, place: usize| -> Option<f64> {
+        Some(each.get(place)?.of(model.model.parts.get(place)?.kind().name()))
+    };
+    if model.model.parts.len() == 2
+        && each.get(1).is_some_and(|second| second.verdict() != Verdict::Effect)
+        && let Some(second) = rounds.get(1).filter(|round| has(&round.base.model, name))
+    {
+        model = second.base.clone();
     }
-    let little = chance < settings.left_by_chance && closed_fraction < NEARLY_CLOSED;
-    little.then(|| {
+    let confidence = |place: usize| match place {
+        0 => probabilities.of(model.model.parts[0].kind().name()).max(probability),
+        _ => further(&model, place).unwrap_or(probability),
+    };
+    let confidences: Vec<f64> = (0..model.model.parts.len()).map(confidence).collect();
+    let reason = (verdict == Verdict::Unknown).then(|| {
+        let best = if name.is_empty() { "none that was tried".to_string() } else { format!("{name}, the best that was tried, with {probability:.2}") };
         format!(
-            "what is left is small, but no chance: in one channel and phase it stands out as noise does in one log of {:.0}",
-            chance.recip()
+            "noise and contacts alone explain this log with probability {:.2}, an effect of the catalogue with {:.2} ({best})",
+            probabilities.none,
+            probabilities.effect()
         )
-    })
+    });
+    Decided { verdict, probabilities, confidences, model, in_part, reason }
 }
 
-/// Whether the effects of a model that does not explain the gap are worth telling: they close a part of it. Which of several that do as well it is, the confusion set
-/// says.
-pub(crate) fn comes_near(diagnosis: &Diagnosis) -> bool {
-    let [before, after] = heldout_errors(diagnosis);
-    !diagnosis.model.model.parts.is_empty() && closed_fraction(before, after) > LEAST_CLOSED
+/// Whether its effects were added to the nominal model together, not one to another.
+fn found_at_once(model: &Model, rounds: &[Round]) -> bool {
+    model.parts.len() > 1 && rounds.get(1).is_some_and(|second| second.base.model.parts.is_empty())
 }
 
-/// Whether what is named closes so little of the gaps of typical episodes, of those held out or of those fitted, that something else makes them. Of each
-/// episode: mean squares under the nominal and the accepted model.
-fn stands_for_another(
-    before: f64,
-    heldout: impl Iterator<Item = [f64; 2]>,
-    fitted: impl Iterator<Item = [f64; 2]>,
-    settings: &Settings,
-) -> bool {
-    let of_heldout = before > settings.gap && typical_closing(heldout, settings.gap) < HALF;
-    of_heldout || typical_closing(fitted, settings.unexplained) < HALF
-}
-
-/// Median over the episodes with a mean square above `gap` of the share of it that is closed; 1 where there are too few to say. Of each episode: mean
-/// squares under the nominal and the accepted model.
-fn typical_closing(episodes: impl Iterator<Item = [f64; 2]>, gap: f64) -> f64 {
-    let plain = episodes.filter(|[before, _]| *before > gap);
-    let mut closings: Vec<f64> = plain.map(|[before, after]| (before - after) / (before - NOISE_FLOOR)).collect();
-    if closings.len() < LEAST_GAPS {
-        return 1.0;
-    }
-    closings.sort_by(f64::total_cmp);
-    closings[closings.len() / 2]
+fn has(model: &Model, name: &str) -> bool {
+    model.parts.iter().any(|part| part.kind().name() == name)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::candidate::{candidates, tests::context};
+    use crate::decision::tests::{by_evidence, findings};
+    use crate::likelihood::Stack;
+    use crate::rival::{Heldout, Rival};
 
-    #[test]
-    fn what_closes_little_of_the_plain_gaps_stands_for_something_else() {
-        // A magnet that three of six episodes meet, taken for a tilt.
-        let met = [[1.2, 0.9], [2.0, 1.9], [1.3, 1.1], [1.1, 1.1], [5.0, 4.1], [13.0, 13.6]];
-        assert!(typical_closing(met.into_iter(), 1.4) < HALF);
-        // Two episodes are no rule, and one odd one of four is none.
-        assert_eq!(typical_closing(met.into_iter().take(5), 1.4), 1.0);
-        assert!(typical_closing([[3.0, 1.0], [4.0, 1.1], [2.0, 0.9], [9.0, 9.5]].into_iter(), 1.4) > HALF);
+    /// With the first effects of the catalogue from `first` on.
+    fn fit(first: usize, effects: usize) -> Fit {
+        let all = candidates(&context());
+        let chosen = all.iter().skip(first).take(effects);
+        let model = chosen.fold(Model::nominal(0, 0), |model, candidate| model.with(candidate));
+        Fit::new(model, Vec::new(), Vec::new(), Stack::default(), Vec::new())
+    }
+
+    fn rival(fit: Fit, whole: bool) -> Rival {
+        Rival { fit, whole, gain: 1.0, heldout: Heldout::default() }
+    }
+
+    /// A round that adds an effect to `base` others, the first ones.
+    fn round(base: usize) -> Round {
+        let (before, passed_over, promises) = (Heldout::default(), Vec::new(), Vec::new());
+        let rivals = vec![rival(fit(0, base + 1), true)];
+        Round { promises, rivals, passed_over, base: fit(0, base), before, hasty: false }
+    }
+
+    fn name(place: usize) -> String {
+        fit(place, 1).model.parts[0].kind().name().into()
+    }
+
+    fn found(place: usize, log_evidence: f64) -> Findings {
+        findings(&name(place), log_evidence)
     }
 
     #[test]
-    fn much_is_left_whatever_stands_out_and_little_where_it_stands_out() {
-        let settings = Settings::default();
-        let left = |trimmed_mean, chance, closed| is_left(trimmed_mean, chance, closed, &settings).is_some();
-        assert!(left(1.5, 1.0, 0.5) && left(1.05, 0.001, 0.5));
-        // Noise, as it comes; what is nearly closed.
-        assert!(!left(1.05, 0.05, 0.5) && !left(1.05, 0.001, 0.95) && !left(1.5, 1.0, 0.96));
-        assert!(left(1.5, 0.001, 0.93), "much is left");
-        assert!(left(12.0, 1.0, 0.99), "whatever was there before");
+    fn what_is_more_probable_than_not_is_named_whatever_the_search_accepted() {
+        let none = by_evidence([0.0, -50.0]);
+        let named = decide(&none, fit(0, 0), &[round(0)], &[vec![found(0, 8.0)]]);
+        assert_eq!((named.verdict, named.model.model.parts.len(), named.in_part), (Verdict::Effect, 1, false));
+        assert!((named.confidences[0] - 0.9).abs() < 1e-9);
+        // What the search accepted is taken back where nothing is missing.
+        let kept = decide(&none, fit(0, 1), &[round(0)], &[vec![found(0, 0.0)]]);
+        assert_eq!((kept.verdict, kept.model.model.parts.len(), kept.reason), (Verdict::None, 0, None));
+    }
+
+    #[test]
+    fn what_is_named_need_not_be_what_the_search_took_first() {
+        let mut first = round(0);
+        let other = (1..).find(|place| name(*place) != name(0)).unwrap();
+        first.rivals.push(rival(fit(other, 1), false));
+        let compared = vec![found(0, 3.0), found(other, 80.0)];
+        let named = decide(&by_evidence([0.0, 0.0]), fit(0, 1), &[first], &[compared]);
+        assert_eq!(named.model.model.parts[0].kind().name(), name(other));
+        assert!(named.in_part && named.confidences[0] > 0.9, "{named:?}");
+    }
+
+    #[test]
+    fn an_unknown_gap_shows_an_effect_that_is_worth_telling() {
+        let near = decide(&by_evidence([-50.0, 1.0]), fit(0, 1), &[round(0)], &[vec![found(0, 0.0)]]);
+        assert_eq!((near.verdict, near.model.model.parts.len()), (Verdict::Unknown, 1));
+        assert!(near.confidences[0] < 0.5 && near.reason.is_some());
+        let far = decide(&by_evidence([-50.0, 3.0]), fit(0, 1), &[round(0)], &[vec![found(0, 0.0)]]);
+        assert_eq!((far.verdict, far.model.model.parts.len()), (Verdict::Unknown, 0));
+        let nothing = decide(&by_evidence([-50.0, 3.0]), fit(0, 0), &[round(0)], &[vec![findings("", 0.0)]]);
+        assert_eq!((nothing.verdict, nothing.model.model.parts.len()), (Verdict::Unknown, 0));
+    }
+
+    #[test]
+    fn a_further_effect_is_named_where_it_is_more_probable_than_not_that_there_is_one() {
+        let none = by_evidence([0.0, -50.0]);
+        let rounds = [round(0), round(1)];
+        let second = fit(0, 2).model.parts[1].kind().name();
+        let of = |log_evidence| [vec![found(0, 8.0)], vec![findings(second, log_evidence)]];
+        let both = decide(&none, fit(0, 2), &rounds, &of(4.0));
+        assert_eq!(both.confidences.len(), 2);
+        let one = decide(&none, fit(0, 2), &rounds, &of(0.0));
+        assert_eq!((one.verdict, one.model.model.parts.len()), (Verdict::Effect, 1));
     }
 }

@@ -182,3 +182,36 @@ fn four_effects_that_hide_each_other_are_named_together() {
     assert!(report.heldout.after < 0.5 * report.heldout.before, "{:?}", report.heldout);
     assert!(report.rollouts <= 5000, "{}", report.rollouts);
 }
+
+/// Throws of a ball of 2 cm and 2.7 g through the air, of which only the place is read.
+fn flights(drag_pm: f64) -> Log {
+    const MASS_KG: f64 = 0.002_7;
+    let effects = [EffectKind::QuadraticDrag.from_parameters(&[drag_pm * MASS_KG]).unwrap().build()];
+    let shape = RigShape::Solid { shape: ObjectShape::Sphere, size_m: [0.02, 0.0, 0.0] };
+    let ball = RigObject::new(shape, MASS_KG, FRICTION);
+    let mut header = header();
+    header.object.shape = Shape::Sphere { radius_m: 0.02.into() };
+    header.object.mass_kg = MASS_KG.into();
+    header.noise = Noise { object_position_m: Some(POSITION_M), ..Noise::default() };
+    let episodes = (0..TOSSES).map(|id| {
+        let mut rng = Seed(id).stream(Purpose::World, 0);
+        let mut body = start(&mut rng);
+        body.position_m[2] = 1.5;
+        body.linear_mps = body.linear_mps.map(|speed| 5.0 * speed);
+        let readings = rig().run(&ball, &effects, &RigStart::of_episode(body, None), &[[0.0; 3]; ROWS / 2]).unwrap();
+        let mut episode = Episode { id, ..Episode::default() };
+        append(&mut episode, &body, &mut rng);
+        readings.iter().for_each(|reading| append(&mut episode, &reading.object, &mut rng));
+        episode.channels.retain(|channel, _| matches!(channel, Channel::ObjectPosition(_)));
+        episode
+    });
+    Log { header, episodes: episodes.collect() }
+}
+
+#[test]
+fn the_drag_of_a_ball_of_grams_is_named() {
+    let report = report(&flights(0.16));
+    assert_eq!(report.effects[0].name, "quadratic_drag", "{}", report.summary);
+    let (coefficient, [low, high]) = found(&report, "quadratic_drag", "coefficient_ns2pm2");
+    assert!((coefficient / 0.002_7 - 0.16).abs() < 0.02 && low < high, "{coefficient} [{low}, {high}]");
+}

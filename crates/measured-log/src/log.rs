@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use crate::error::Problem;
-use crate::header::{Header, Robot};
+use crate::header::{Header, Robot, Shape};
 use crate::{Axis, Channel, Component, MAX_ROWS, Readings, UNIT_TOLERANCE, split};
 
 /// A measured or simulated log.
@@ -200,7 +200,12 @@ fn check_columns(header: &Header, episode: &Episode) -> Result<(), Problem> {
         }
     }
     let (position, orientation) = (Channel::ObjectPosition(Axis::X), Channel::ObjectOrientation(Component::X));
+    // A ball looks the same from all sides.
+    let ball = matches!(header.object.shape, Shape::Sphere { .. });
     for (one, other) in [(position, orientation), (orientation, position)] {
+        if ball && one == orientation {
+            continue;
+        }
         if (header.robot == Robot::None || has(other)) && !has(one) {
             return Err(Problem::column(one.name(), "expected the pose of the object, found none"));
         }

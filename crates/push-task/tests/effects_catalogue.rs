@@ -91,8 +91,8 @@ fn largest_difference(a: &[Observation], b: &[Observation]) -> f64 {
 }
 
 #[test]
-fn the_catalogue_has_35_names_that_scenario_files_know() {
-    assert_eq!(EffectKind::ALL.len(), 35, "33 rows, one of which names two, and round edges");
+fn the_catalogue_has_36_names_that_scenario_files_know() {
+    assert_eq!(EffectKind::ALL.len(), 36, "33 rows, one of which names two, round edges and late forces");
     for kind in EffectKind::ALL {
         assert_eq!(kind.name().parse::<EffectKind>(), Ok(*kind));
         for effect in kind.variants() {

@@ -4,6 +4,7 @@
 use physics_model::effect::EffectConfig;
 
 use super::{Place, RANGE_M, Seen, circles, climb};
+use crate::budget::Budget;
 use crate::candidate::bodies;
 use crate::fit::Fit;
 use crate::likelihood::{Stack, explained, mean_square};
@@ -44,11 +45,9 @@ struct Episodes<'a> {
 pub(crate) fn refined_place(study: &Study, null: &Fit, seen: &Seen, voted: Place) -> Option<Place> {
     let hypothesis = null.model.hypothesis(&null.x);
     let sizes = null.model.engine_errors(&null.x);
-    let simulator = study.simulator;
-    let begun = simulator.rollouts();
-    let affordable = || simulator.rollouts() - begun < MOST;
+    let budget = Budget::new([MOST; 3]);
     let learnt = |places: Vec<usize>| {
-        let mut study = study.part(&places);
+        let mut study = study.part(&places).within(&budget);
         study.learn_errors(&hypothesis);
         let before = study.white(&study.raw(&hypothesis), sizes);
         Episodes { study, before }
@@ -72,7 +71,7 @@ pub(crate) fn refined_place(study: &Study, null: &Fit, seen: &Seen, voted: Place
         if gain.is_finite() { gain } else { f64::NEG_INFINITY }
     };
     let tried = |place: Place, body: usize, least: f64| {
-        let found = bodies(&place).nth(body).filter(|_| affordable())?;
+        let found = bodies(&place).nth(body).filter(|_| budget.has_fits())?;
         Some(Tried { gain: gain(found, least), place, body })
     };
     let mut found: Vec<Tried> = promising(seen, voted).into_iter().filter_map(|place| tried(place, 0, 0.0)).collect();
@@ -115,7 +114,7 @@ fn promising(seen: &Seen, place: Place) -> Vec<Place> {
 /// Places in the study of the episodes that come near a body: those that the model leaves most of, and others.
 fn near(study: &Study, null: &Fit, seen: &Seen, body: Place) -> [Vec<usize>; 2] {
     let white = study.white(&study.raw(&null.model.hypothesis(&null.x)), &[]);
-    let apart_m = study.chosen.iter().map(|trial| seen.apart_m(*trial, body));
+    let apart_m = (0..study.chosen.len()).map(|place| seen.apart_m(place, body));
     let left: Vec<f64> = white.iter().map(|residuals| mean_square(std::slice::from_ref(residuals))).collect();
     choose(&left, &apart_m.collect::<Vec<_>>())
 }

@@ -8,7 +8,6 @@ use physics_model::effect::Neutral;
 
 use super::plain;
 use super::svg::{Axis, strip, strip_labels, upright};
-use crate::diagnosis::Settings;
 use crate::interval::decimals;
 use crate::report::{NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
 
@@ -22,7 +21,7 @@ pub(super) fn what(report: &Report, words: &Words) -> Markup {
             @if report.verdict == Verdict::Unknown {
                 "No effect of the catalogue explains the gap. Where it acts is said under " a href="#remains" { "what remains" } "."
             } @else {
-                "No " (words.mark("effect")) " is needed: the " (words.mark("re-tuned")) " nominal model explains the log as well as its noise allows."
+                "No " (words.mark("effect")) " is needed: the " (words.mark("re-tuned")) " nominal model explains the log as well as its noise, and contacts of its own, allow."
             }
         }
     }
@@ -121,24 +120,20 @@ pub(super) fn ranking(report: &Report, words: &Words) -> Markup {
 
 fn bars(ranking: &[RankedEffect], words: &Words) -> Markup {
     let axis = Axis::linear(ranking.iter().map(|rival| rival.log_evidence).chain([0.0]));
-    let best = ranking.iter().map(|rival| rival.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-    let settings = Settings::default();
-    let [near, odds] = [settings.near(), settings.confusion].map(|value| fixed(value, 0));
     html! {
         div class="row rank soft" {
             span { "effect" } span {}
-            span { span { (words.mark("gain")) } span { (words.mark("behind")) } span { (words.mark_as("held-out error", "held-out")) } }
+            span { span { (words.mark("gain")) } span { (words.mark_as("confidence", "right")) } span { (words.mark_as("held-out error", "held-out")) } }
         }
-        @for rival in ranking { (bar(&axis, rival, best)) }
+        @for rival in ranking { (bar(&axis, rival)) }
         div class="row rank axis" { span {} div { (strip_labels(&axis, 4)) } span {} }
         p.soft {
-            "Gain in " (words.mark("ln evidence")) " over the re-tuned nominal model; behind: how much less than the best (" (near) " is " (odds)
-            " to 1, see confidence); held-out: mean square with it. A name needs both: the gain, and held-out episodes that agree."
+            "Gain in " (words.mark("ln evidence")) " over the re-tuned nominal model; right: how probable it is that this is the effect; held-out: mean square with it."
         }
     }
 }
 
-fn bar(axis: &Axis, rival: &RankedEffect, best: f64) -> Markup {
+fn bar(axis: &Axis, rival: &RankedEffect) -> Markup {
     let gain = if rival.log_evidence.is_finite() { rival.log_evidence } else { 0.0 };
     let (a, b) = (axis.at(gain.min(0.0)), axis.at(gain.max(0.0)));
     let class = if gain < 0.0 { "neg" } else { "a" };
@@ -147,13 +142,11 @@ fn bar(axis: &Axis, rival: &RankedEffect, best: f64) -> Markup {
         rect class=(class) x=(per_cent(a)) y="5" width=(per_cent((b - a).max(0.004))) height="14" rx="2" {}
         (upright("frame", axis, 0.0, 24))
     };
-    let behind = best - rival.log_evidence;
-    let behind = if behind > 0.0 { log_evidence(-behind) } else { "–".into() };
     html! {
         div class="row rank" {
             span { (plain(rival.name)) }
             div { (strip(axis, 4, 24, &inside)) }
-            span { span { (log_evidence(rival.log_evidence)) } span { (behind) } span { (fixed(rival.heldout, 2)) } }
+            span { span { (log_evidence(rival.log_evidence)) } span { (fixed(rival.probability, 2)) } span { (fixed(rival.heldout, 2)) } }
         }
     }
 }

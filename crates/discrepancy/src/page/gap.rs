@@ -210,15 +210,19 @@ fn whiteness(residuals: &Residuals, same: bool) -> Markup {
 
 /// What remains, as a sentence or two.
 pub(super) fn remains(report: &Report) -> Markup {
-    match report.verdict {
-        Verdict::Unknown => html! {
-            div.call { p { b { "Unexplained." } " " (report.description.as_deref().unwrap_or_default()) } }
+    if let Some(description) = &report.description {
+        return html! {
+            div.call { p { b { "Unexplained." } " " (description) } }
             @if let Some(lacking) = &report.lacking_force { (lacking_force(lacking)) }
-        },
+        };
+    }
+    match report.verdict {
         Verdict::Effect => html! {
             p { "Where the model with the named effects still disagrees, on the episodes that it was fitted to:" }
         },
-        Verdict::None => html! { p { "Nothing that shows: the map above is what the re-tuned nominal model leaves." } },
+        Verdict::None | Verdict::Unknown => {
+            html! { p { "Nothing that shows: the map above is what the re-tuned nominal model leaves." } }
+        }
     }
 }
 

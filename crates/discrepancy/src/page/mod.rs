@@ -81,6 +81,7 @@ fn verdict(name: &str, report: &Report, words: &Words) -> Markup {
             @if let Some(begun) = begun { (begun) }
             @if let Some(reason) = &report.reason { p.call { "Why unknown: " (reason) "." } }
             @if let Some(description) = &report.description { p.call { "What is left: " (description) "." } }
+            @for sentence in report.retuned_sentences() { p.call { (sentence) } }
             (facts(&numbers))
             p { b { "Next:" } " " (report.next_experiment) }
         }
@@ -95,7 +96,7 @@ fn foot(report: &Report, words: &Words) -> Markup {
         p.soft {
             (words.mark_as("seed", "Seed")) " " (report.seed) (fold) "; " (report.rollouts) " "
             (words.mark_as("simulated episode", "simulated episodes")) ", " (fixed(report.seconds, 1)) " s. Version "
-            (report.version) " of the contract of report.json." (left_out)
+            (report.version) " of the contract of report.json. " (report.split.sentence()) " " (report.noise_sentence()) (left_out)
         }
     };
     html! { (words.list()) (last) }

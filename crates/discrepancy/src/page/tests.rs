@@ -1,7 +1,10 @@
 use super::page;
+use crate::decision::Probabilities;
 use crate::evidence::{BINS, ChannelError, Course, Evidence, LAGS, Path, Residuals};
 use crate::locate::Cell;
+use crate::noise::{SensorNoise, Source};
 use crate::report::{Heldout, NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
+use crate::split::Split;
 use crate::terms::{Coefficient, FoundTerm, LackingForce};
 use crate::trial::{Kind, Phase};
 
@@ -40,6 +43,15 @@ fn evidence() -> Evidence {
     }
 }
 
+fn noise() -> SensorNoise {
+    let (channel, source) = (Kind::ObjectPosition, Source::Estimated);
+    SensorNoise { channel, unit: "m", stddev: 5e-4, source, scatter: Some(5e-4) }
+}
+
+fn probabilities() -> Probabilities {
+    Probabilities { effects: vec![("table_tilt".into(), 0.97)], none: 0.01, unknown: 0.02 }
+}
+
 fn report(verdict: Verdict) -> Report {
     let tilt = NamedEffect {
         name: "table_tilt",
@@ -60,14 +72,16 @@ fn report(verdict: Verdict) -> Report {
     ];
     let named = verdict == Verdict::Effect;
     Report {
+        findings: Vec::new(),
+        probabilities: probabilities(),
         version: 1,
         verdict,
         summary: "A sentence.".into(),
         effects: if named { vec![tilt] } else { Vec::new() },
         confusion_set: if named { vec!["table_tilt", "constant_force"] } else { Vec::new() },
         ranking: vec![
-            RankedEffect { name: "table_tilt", log_evidence: 210.0, heldout: 1.01 },
-            RankedEffect { name: "adhesion", log_evidence: -4.0, heldout: 9.0 },
+            RankedEffect { name: "table_tilt", log_evidence: 210.0, probability: 0.97, heldout: 1.01 },
+            RankedEffect { name: "adhesion", log_evidence: -4.0, probability: 0.0, heldout: 9.0 },
         ],
         located: cells.clone(),
         remaining: cells,
@@ -105,6 +119,8 @@ fn report(verdict: Verdict) -> Report {
         }],
         evidence: evidence(),
         next_experiment: "Push in eight directions.".into(),
+        noise: vec![noise()],
+        split: Split { fitted: 28, choosing: 6, reported: 6, shared: false },
         seed: 1,
         fold: None,
         left_out: Vec::new(),
@@ -214,8 +230,7 @@ fn pages_are_well_formed_whatever_the_numbers() {
 #[test]
 fn the_glossary_says_the_numbers_of_the_settings() {
     let settings = crate::Settings::default();
-    let (confidence, set) = (page::word("confidence").unwrap(), page::word("confusion set").unwrap());
-    assert!(confidence.more.contains(&format!("divided by {:.0},", settings.temperature)));
+    let set = page::word("confusion set").unwrap();
     assert!(set.means.contains(&format!("1 to {:.0} ", settings.confusion)));
 }
 

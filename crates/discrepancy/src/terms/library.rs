@@ -2,6 +2,7 @@
 
 use super::Coefficient;
 use crate::trial::Window;
+use crate::units::Units;
 
 /// Frequencies that are tried, Hz, in steps by which a few seconds lose less than a quarter of a period. All episodes are taken to begin at the same phase.
 const FREQUENCIES_HZ: [f64; 2] = [0.5, 8.3];
@@ -137,6 +138,18 @@ impl Term {
             Self::Mass => units(window.mass_kg - middle.mass_kg).collect(),
             Self::AgainstMotionByMass => vec![times(window.mass_kg - middle.mass_kg, against)],
             Self::Force => (0..2).map(|axis| times(window.simulated_n[axis], unit(axis))).collect(),
+        }
+    }
+
+    /// Where it acts, in units of which `units` says how much one of today's is.
+    pub(super) fn in_units(self, units: &Units) -> Self {
+        let length = units.factor("m");
+        match self {
+            Self::NearPlace { place_m } => Self::NearPlace { place_m: place_m.map(|place| length * place) },
+            Self::AgainstMotionInStripes { axis, wave_m } => {
+                Self::AgainstMotionInStripes { axis, wave_m: length * wave_m }
+            }
+            term => term,
         }
     }
 

@@ -31,7 +31,7 @@ fn pushes(seed: u64, episodes: usize, force: impl Fn(&Window) -> [f64; 2]) -> Op
         });
         all.push(windows.collect());
     }
-    describe(&all, 2)
+    describe(&all, 2, &Units::default())
 }
 
 fn value(term: &FoundTerm, key: &str) -> f64 {

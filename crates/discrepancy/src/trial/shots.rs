@@ -23,9 +23,12 @@ pub(super) fn shots(log: &Log, episode: &Episode, noise: &NoiseLevels) -> Vec<Tr
     let mut first = 0;
     while first + LEAST_ROWS <= episode.rows() {
         let end_secs = episode.time_secs[first] + SHOT_SECS;
-        let end = episode.time_secs.partition_point(|time| *time <= end_secs);
+        // Of a slow camera as many rows as a start needs.
+        let end = episode.time_secs.partition_point(|time| *time <= end_secs).max(first + LEAST_ROWS);
         let piece = piece(episode, first, end);
-        let smooth = start::moving(&piece, noise).filter(|(.., left)| *left < SMOOTH);
+        // A spin that was measured says how often it has turned between two rows.
+        let spin = episode.vector(Channel::ObjectSpin, first);
+        let smooth = start::moving(&piece, noise, spin).filter(|(.., left)| *left < SMOOTH);
         match smooth.and_then(|(body, stddev, _)| Trial::begun(log, &piece, noise, false, (body, stddev))) {
             Some(trial) => {
                 found.push(trial);

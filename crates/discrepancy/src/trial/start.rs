@@ -53,15 +53,57 @@ pub(super) fn posture(episode: &Episode, joints: u8) -> Option<JointVector> {
     (joints > 0).then_some(posture)
 }
 
-/// The command at the end of each tick, m, from the command columns, else from where the tool was measured.
-pub(super) fn commands(episode: &Episode, begin_secs: f64, period_secs: f64, ticks: usize) -> Option<Vec<[f64; 3]>> {
-    let given = |make: fn(Axis) -> Channel| {
-        let points: Vec<(f64, [f64; 3])> = (0..episode.rows())
-            .filter_map(|row| Some((episode.time_secs[row] - begin_secs, episode.vector(make, row)?)))
-            .collect();
-        (!points.is_empty()).then_some(points)
+/// Places of a vector by the time since the start, s; `None` where there are none.
+fn given(episode: &Episode, make: fn(Axis) -> Channel, begin_secs: f64) -> Option<Vec<(f64, [f64; 3])>> {
+    let points: Vec<(f64, [f64; 3])> = (0..episode.rows())
+        .filter_map(|row| Some((episode.time_secs[row] - begin_secs, episode.vector(make, row)?)))
+        .collect();
+    (!points.is_empty()).then_some(points)
+}
+
+/// Half widths, in rows, over which places of the tool are smoothed, the widest first.
+const HALF_WIDTHS: [usize; 4] = [8, 5, 3, 2];
+/// A parabola that leaves more than this, as a mean square in variances of the sensor, is not the tool's way.
+const NOT_ITS_WAY: f64 = 1.5;
+
+/// The way of a tool that was read with noise of `sigma_m`: of each place the parabola through as many of its neighbours as lie on one. A kinematic tool that
+/// went where noise has it would shake what it pushes.
+fn smoothed(points: &[(f64, [f64; 3])], sigma_m: f64) -> Vec<(f64, [f64; 3])> {
+    let smooth = |index: usize, half: usize| -> Option<[f64; 3]> {
+        let near = &points[index.saturating_sub(half)..points.len().min(index + half + 1)];
+        if near.len() < 5 {
+            return None;
+        }
+        let span = near[near.len() - 1].0 - near[0].0;
+        let design =
+            nalgebra::DMatrix::from_fn(near.len(), 3, |i, j| ((near[i].0 - points[index].0) / span).powi(j as i32));
+        let inverse = (design.transpose() * &design).try_inverse()?;
+        let mut place = [0.0; 3];
+        for (axis, place) in place.iter_mut().enumerate() {
+            let read = nalgebra::DVector::from_fn(near.len(), |i, _| near[i].1[axis]);
+            let solution = &inverse * design.transpose() * &read;
+            let left = (&read - &design * &solution).norm_squared() / (near.len() - 3) as f64;
+            *place = (left < NOT_ITS_WAY * sigma_m * sigma_m).then_some(solution[0])?;
+        }
+        Some(place)
     };
-    let points = given(Channel::Command).or_else(|| given(Channel::Tool))?;
+    let one = |(index, point): (usize, &(f64, [f64; 3]))| {
+        (point.0, HALF_WIDTHS.into_iter().find_map(|half| smooth(index, half)).unwrap_or(point.1))
+    };
+    points.iter().enumerate().map(one).collect()
+}
+
+/// The command at the end of each tick, m, from the command columns, else from where the tool was measured.
+pub(super) fn commands(
+    episode: &Episode,
+    noise: &NoiseLevels,
+    begin_secs: f64,
+    period_secs: f64,
+    ticks: usize,
+) -> Option<Vec<[f64; 3]>> {
+    let sigma_m = noise.of(Kind::ToolPosition).unwrap_or(0.0);
+    let read = || given(episode, Channel::Tool, begin_secs).map(|points| smoothed(&points, sigma_m));
+    let points = given(episode, Channel::Command, begin_secs).or_else(read)?;
     let mut next = 0;
     Some(
         (1..=ticks)
@@ -88,7 +130,11 @@ pub(super) fn commands(episode: &Episode, begin_secs: f64, period_secs: f64, tic
 /// Where the tool rests before it first moves: where it is sent, if that is where it is read to be, else the mean of the readings.
 pub(super) fn tool(episode: &Episode, noise: &NoiseLevels) -> Option<[f64; 3]> {
     let first = |make| (0..episode.rows()).find_map(|row| episode.vector(make, row));
-    let Some(sent) = first(Channel::Command) else { return first(Channel::Tool) };
+    let Some(sent) = first(Channel::Command) else {
+        return given(episode, Channel::Tool, 0.0).and_then(|points| {
+            smoothed(&points, noise.of(Kind::ToolPosition).unwrap_or(0.0)).first().map(|point| point.1)
+        });
+    };
     let resting = |row: &usize| episode.vector(Channel::Command, *row).is_none_or(|command| command == sent);
     let read: Vec<Vector3<f64>> = (0..episode.rows().min(REST_ROWS))
         .take_while(resting)
@@ -121,7 +167,7 @@ pub(super) fn start(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState
         }
     }
     // At rest: the mean of what was read before anything moved.
-    let poses = poses(episode, REST_ROWS);
+    let poses = poses(episode, REST_ROWS, None);
     let resting = poses.iter().take_while(|(_, place, _)| (place - here).amax() < REST_SIGMAS * sigma_m).count();
     if resting > VELOCITY_ROWS / 2 {
         // The later half may already be moving by less than what shows.
@@ -132,7 +178,7 @@ pub(super) fn start(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState
         let start = state(place, turn, [0.0; 3], [0.0; 3]);
         return Some((start, [sigma_m / n.sqrt(), sigma_rad / n.sqrt(), 0.0, 0.0]));
     }
-    let found = moving(episode, noise).map(|(start, stddev, _)| (start, stddev));
+    let found = moving(episode, noise, None).map(|(start, stddev, _)| (start, stddev));
     Some(found.unwrap_or_else(|| (state(here, Vector3::zeros(), [0.0; 3], [0.0; 3]), [sigma_m, sigma_rad, 0.0, 0.0])))
 }
 
@@ -152,23 +198,42 @@ fn state(
     BodyState { position_m: place.into(), orientation: [q.i, q.j, q.k, q.w], linear_mps, angular_rps }
 }
 
-/// Time, place and turn since the first row, of the first rows, as far as all have a place.
-fn poses(episode: &Episode, rows: usize) -> Vec<(f64, Vector3<f64>, Vector3<f64>)> {
+/// Time, place and turn since the first row, of the first rows, as far as all have a place. `spin`: in the first row, rad/s, base axes, where it is known.
+fn poses(episode: &Episode, rows: usize, spin: Option<[f64; 3]>) -> Vec<(f64, Vector3<f64>, Vector3<f64>)> {
     let back = first_attitude(episode).inverse();
+    let (mut last, mut rate) = ((0.0, Vector3::zeros()), spin.map_or_else(Vector3::zeros, Vector3::from));
     (0..episode.rows().min(rows))
         .map_while(|row| {
             let place = Vector3::from(episode.vector(Channel::ObjectPosition, row)?);
+            let time = episode.time_secs[row] - episode.time_secs[0];
             let turn = episode.orientation(row).map_or_else(Vector3::zeros, |q| (rotation(q) * back).scaled_axis());
-            Some((episode.time_secs[row] - episode.time_secs[0], place, turn))
+            let turn = nearest_turn(turn, last.1 + rate * (time - last.0));
+            if time > last.0 {
+                rate = (turn - last.1) / (time - last.0);
+                last = (time, turn);
+            }
+            Some((time, place, turn))
         })
         .collect()
 }
 
+/// Of the rotation vectors of a turn, which differ by whole turns, the one that is nearest to what is expected.
+fn nearest_turn(turn: Vector3<f64>, expected: Vector3<f64>) -> Vector3<f64> {
+    let axis = turn.try_normalize(1e-9).or_else(|| expected.try_normalize(1e-9));
+    let Some(axis) = axis else { return turn };
+    let whole = ((expected - turn).dot(&axis) / std::f64::consts::TAU).round();
+    turn + axis * (whole * std::f64::consts::TAU)
+}
+
 /// The same in motion: a parabola through the first poses, its constant and its slope. Last, the mean square of what it leaves, in variances of
-/// the sensor.
-pub(super) fn moving(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyState, [f64; 4], f64)> {
+/// the sensor. `spin`: as measured in the first row, rad/s.
+pub(super) fn moving(
+    episode: &Episode,
+    noise: &NoiseLevels,
+    spin: Option<[f64; 3]>,
+) -> Option<(BodyState, [f64; 4], f64)> {
     let (sigma_m, sigma_rad) = (noise.of(Kind::ObjectPosition)?, noise.of(Kind::ObjectOrientation).unwrap_or(0.0));
-    let rows = poses(episode, VELOCITY_ROWS);
+    let rows = poses(episode, VELOCITY_ROWS, spin);
     if rows.len() < 4 {
         return None;
     }
@@ -195,4 +260,62 @@ pub(super) fn moving(episode: &Episode, noise: &NoiseLevels) -> Option<(BodyStat
     let stddev = [sigma_m * constant, sigma_rad * constant, sigma_m * slope, sigma_rad * slope];
     let freedoms = (rows.len() - 3) * if sigma_rad > 0.0 { 6 } else { 3 };
     Some((start, stddev, left / freedoms.max(1) as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use measured_log::{Component, Readings};
+    use pomdp::{Purpose, Seed};
+    use rand_distr::{Distribution as _, StandardNormal};
+
+    use super::*;
+
+    /// An object that spins about the vertical, read every `period_secs`.
+    fn spinning(rate_rps: f64, period_secs: f64) -> Episode {
+        let time_secs: Vec<f64> = (0..8).map(|row| period_secs * f64::from(row)).collect();
+        let mut episode = Episode { time_secs: time_secs.clone(), ..Episode::default() };
+        for axis in Axis::ALL {
+            episode.channels.insert(Channel::ObjectPosition(axis), time_secs.iter().map(|_| 0.0).collect());
+        }
+        for (i, component) in Component::ALL.into_iter().enumerate() {
+            let part = |time: &f64| {
+                let (sin, cos) = (0.5 * rate_rps * time).sin_cos();
+                [0.0, 0.0, sin, cos][i]
+            };
+            let cells: Readings = time_secs.iter().map(part).collect();
+            episode.channels.insert(Channel::ObjectOrientation(component), cells);
+        }
+        episode
+    }
+
+    #[test]
+    fn a_spin_of_many_turns_is_followed_and_a_measured_one_beyond_half_a_turn_a_row() {
+        let turned = |rate_rps: f64, spin| poses(&spinning(rate_rps, 0.02), 8, spin)[7].2[2];
+        // 0.57 turns a row look like 0.43 the other way.
+        assert!((turned(180.0, Some([0.0, 0.0, 175.0])) - 180.0 * 0.14).abs() < 1e-9);
+        assert!((turned(100.0, None) - 14.0).abs() < 1e-9);
+        assert!((turned(-3.0, None) + 0.42).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_tool_that_was_read_with_noise_goes_its_way() {
+        let mut rng = Seed(2).stream(Purpose::Test, 0);
+        // At rest, then at 5 cm/s.
+        let way = |time: f64| 0.05 * (time - 1.0).max(0.0);
+        let points: Vec<(f64, [f64; 3])> = (0..100)
+            .map(|row| {
+                let time = 0.02 * f64::from(row);
+                let noise: [f64; 3] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
+                (time, [way(time) + 1e-4 * noise[0], 1e-4 * noise[1], 1e-4 * noise[2]])
+            })
+            .collect();
+        let error = |points: &[(f64, [f64; 3])]| {
+            (points.iter().map(|(time, place)| (place[0] - way(*time)).powi(2)).sum::<f64>() / 100.0).sqrt()
+        };
+        let found = smoothed(&points, 1e-4);
+        assert!(error(&found) < 0.6 * error(&points), "{} of {}", error(&found), error(&points));
+        // What is exact stays.
+        let exact: Vec<(f64, [f64; 3])> = points.iter().map(|(time, _)| (*time, [way(*time), 0.0, 0.0])).collect();
+        assert!(smoothed(&exact, 1e-6).iter().zip(&exact).all(|(a, b)| (a.1[0] - b.1[0]).abs() < 1.3e-6));
+    }
 }

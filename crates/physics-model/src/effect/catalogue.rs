@@ -112,6 +112,7 @@ catalogue! {
     ForceGain: "The force sensor has another gain.",
     ForceLowPass: "The force sensor is slow.",
     ForceSaturation: "The force sensor has an end of its range.",
+    ForceDelay: "Forces are read late.",
     PoseOffset: "Poses are read beside where they are.",
     PoseDelay: "Poses are read late.",
     PoseScale: "Distances are read longer or shorter.",
@@ -177,6 +178,16 @@ impl EffectConfig {
         effect.set_values(values);
         effect.check()?;
         Ok(effect)
+    }
+
+    /// The same in other units: each continuous value times the factor of its parameter, unchecked.
+    #[must_use]
+    pub fn scaled(&self, factor: impl Fn(&Parameter) -> f64) -> Self {
+        let scaled =
+            self.kind().parameters().iter().zip(self.values()).map(|(parameter, value)| factor(parameter) * value);
+        let mut effect = self.clone();
+        effect.set_values(&scaled.collect::<Vec<f64>>());
+        effect
     }
 
     /// Sets one continuous value, unchecked.

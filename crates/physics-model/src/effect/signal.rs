@@ -184,6 +184,15 @@ impl Blend for [f64; MAX_JOINTS] {
     }
 }
 
+impl Blend for Wrench {
+    fn blend(&self, later: &Self, share: f64) -> Self {
+        let mut blend = Self::default();
+        blend.add_scaled(self, 1.0 - share);
+        blend.add_scaled(later, share);
+        blend
+    }
+}
+
 impl Blend for BodyState {
     fn blend(&self, later: &Self, share: f64) -> Self {
         let (a, mut b) = (self.to_array(), later.to_array());

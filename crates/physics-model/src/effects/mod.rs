@@ -14,6 +14,7 @@ pub mod constant_force;
 pub mod contact_compliance;
 pub mod edge_rounding;
 pub mod force_bias;
+pub mod force_delay;
 pub mod force_drift;
 pub mod force_gain;
 pub mod force_low_pass;
@@ -50,6 +51,7 @@ pub use constant_force::ConstantForce;
 pub use contact_compliance::ContactCompliance;
 pub use edge_rounding::EdgeRounding;
 pub use force_bias::ForceBias;
+pub use force_delay::ForceDelay;
 pub use force_drift::ForceDrift;
 pub use force_gain::ForceGain;
 pub use force_low_pass::ForceLowPass;
@@ -84,7 +86,7 @@ macro_rules! sources {
 
 pub(crate) const SOURCES: &[(&str, &str)] = sources! {
     actuation_delay actuator_gain adhesion anisotropic_friction arm_compliance backlash com_offset constant_force contact_compliance
-    edge_rounding force_bias force_drift force_gain force_low_pass force_saturation friction_level friction_patch hidden_obstacle
+    edge_rounding force_bias force_delay force_drift force_gain force_low_pass force_saturation friction_level friction_patch hidden_obstacle
     joint_friction mass_leak pose_delay pose_offset pose_rotation pose_scale pressure_distribution quadratic_drag restitution
     rolling_resistance static_friction stribeck_friction table_tilt tether time_base viscous_damping wrist_payload
 };

@@ -1,0 +1,192 @@
+//! `cargo xtask diagnose-learn`: how `diagnose` decides, made from logs of other engines.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, bail};
+use clap::Parser;
+use diagnose_benchmark::judge::{Judged, judge};
+use diagnose_benchmark::learn::{Example, learn, leave_one_engine_out, read};
+use discrepancy::decision::{Decision, Probabilities};
+use program::Failed;
+use serde::Serialize;
+use statistics::wilson95;
+use whole_file::Existing;
+
+/// Fits how diagnose decides to its answers on logs whose truth is known, and judges it on the engine that was left out.
+#[derive(Debug, Parser)]
+#[command(name = "diagnose-learn", version, after_help = EXAMPLES)]
+struct Arguments {
+    /// Folders of logs, each with a folder truth beside them.
+    #[arg(required = true)]
+    logs: Vec<PathBuf>,
+    /// Folder of the answers of diagnose: ANSWERS/FOLDER/LOG/report.json.
+    #[arg(long)]
+    answers: PathBuf,
+    /// File that the decision is written to; none: it is judged alone.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Folder for the table of each engine, left out of what judges it.
+    #[arg(long)]
+    table: Option<PathBuf>,
+    /// Judges by this decision, which was made from other logs, instead of learning one: unseen logs.
+    #[arg(long, conflicts_with = "out")]
+    unseen: Option<PathBuf>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask diagnose-learn runs/worlds/mujoco-all-seed11 runs/worlds/bullet-all-seed11 --answers runs/answers --table runs/table
+  cargo xtask diagnose-learn runs/worlds/mujoco-all-seed501 --answers runs/answers --unseen assets/diagnose/decision.json";
+
+/// The table.
+#[derive(Serialize)]
+struct Table {
+    /// What it was made from.
+    provenance: serde_json::Value,
+    /// Engine and what is counted of its logs.
+    engines: Vec<(String, Judged)>,
+}
+
+fn main() -> ExitCode {
+    program::finish(run(&program::parse()))
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let mut examples: Vec<Example> = Vec::new();
+    for folder in &arguments.logs {
+        examples.extend(read(folder, &arguments.answers)?);
+    }
+    let mut engines: Vec<String> = examples.iter().map(|example| example.truth.engine.clone()).collect();
+    engines.sort_unstable();
+    engines.dedup();
+    if arguments.unseen.is_none() && engines.len() < 2 {
+        bail!(
+            "expected answers on logs of two engines or more, found {} logs of {} engines",
+            examples.len(),
+            engines.len()
+        );
+    }
+    let provenance = provenance(arguments, &examples);
+    let judged = match &arguments.unseen {
+        Some(path) => unseen(path, &examples)?,
+        None => leave_one_engine_out(&examples),
+    };
+    let of = |engine: &str| -> Vec<(&Example, Probabilities)> {
+        judged.iter().filter(|(example, _)| engine.is_empty() || example.truth.engine == engine).cloned().collect()
+    };
+    let mut rows: Vec<(String, Judged)> = engines.iter().map(|engine| (engine.clone(), judge(&of(engine)))).collect();
+    rows.push(("all".into(), judge(&of(""))));
+    let table = Table { provenance: provenance.clone(), engines: rows };
+    let text = markdown(&table);
+    program::out!("{text}");
+    if let Some(folder) = &arguments.table {
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        let json = serde_json::to_string_pretty(&table)? + "\n";
+        let name = if arguments.unseen.is_some() { "unseen" } else { "worlds" };
+        for (extension, text) in [("md", &text), ("json", &json)] {
+            write(&folder.join(name).with_extension(extension), text)?;
+        }
+    }
+    if let Some(out) = &arguments.out {
+        let all: Vec<&Example> = examples.iter().collect();
+        write(out, &(serde_json::to_string_pretty(&learn(&all, provenance))? + "\n"))?;
+    }
+    Ok(())
+}
+
+/// Every example with the probabilities of a decision that was made from other logs.
+fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<(&'a Example, Probabilities)>> {
+    let decision: Decision = diagnose_benchmark::folder::read(path)?;
+    let seen = |example: &Example| {
+        let sets = decision.provenance["sets"].as_array();
+        sets.into_iter().flatten().any(|set| set["seed"].as_u64() == Some(example.truth.seed))
+    };
+    if let Some(example) = examples.iter().find(|example| seen(example)) {
+        bail!(
+            "{}: seed {} served to make {}: expected logs of another seed",
+            example.log,
+            example.truth.seed,
+            path.display()
+        );
+    }
+    Ok(examples.iter().map(|example| (example, decision.probabilities(&example.findings))).collect())
+}
+
+fn write(path: &std::path::Path, text: &str) -> Result<()> {
+    let written = whole_file::write(path, text.as_bytes(), Existing::Replace);
+    written.map(|_| ()).map_err(|error| Failed(format!("{error}: {}", error.source).into()).into())
+}
+
+fn provenance(arguments: &Arguments, examples: &[Example]) -> serde_json::Value {
+    let mut sets: Vec<(String, u64, usize)> = Vec::new();
+    for example in examples {
+        let name = format!("{} {}", example.truth.engine, example.truth.variant);
+        match sets.iter_mut().find(|(other, seed, _)| *other == name && *seed == example.truth.seed) {
+            Some(set) => set.2 += 1,
+            None => sets.push((name, example.truth.seed, 1)),
+        }
+    }
+    sets.sort();
+    let folders: Vec<String> =
+        (arguments.logs.iter()).filter_map(|folder| Some(folder.file_name()?.to_string_lossy().into_owned())).collect();
+    let sets: Vec<_> = (sets.iter())
+        .map(|(engine, seed, logs)| serde_json::json!({ "engine": engine, "seed": seed, "logs": logs }))
+        .collect();
+    serde_json::json!({
+        "command": "diagnose-learn",
+        "version": env!("CARGO_PKG_VERSION"),
+        "generator": "tests/peers/worlds/make_logs.py",
+        "folders": folders,
+        "sets": sets,
+        "logs": examples.len(),
+    })
+}
+
+fn markdown(table: &Table) -> String {
+    let mut text = String::from(
+        "| engine | logs | named, of effects that show | `none` called `none` | false alarm | outside called `unknown` | wrong and ≥ 0.9 sure | 90 % intervals cover | calibration error | episodes simulated | s |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (engine, judged) in &table.engines {
+        let _ = writeln!(
+            text,
+            "| {engine} | {} | {} | {} | {} | {} | {} | {} | {:.2} | {:.0} | {:.0} |",
+            judged.logs,
+            share(judged.effects[1], judged.effects[0]),
+            share(judged.none[1], judged.none[0]),
+            share(judged.false_alarms, judged.none[0]),
+            share(judged.outside[1], judged.outside[0]),
+            share(judged.sure_and_wrong, judged.logs),
+            share(judged.intervals[1], judged.intervals[0]),
+            judged.calibration_error,
+            judged.rollouts,
+            judged.seconds,
+        );
+    }
+    let Some((_, all)) = table.engines.last() else { return text };
+    text.push_str(
+        "\n| the effect changes the readings by, noise variances | logs | the search compares it | named |\n|---|---|---|---|\n",
+    );
+    for (size, [logs, compared, named]) in ["3 to 30", "30 to 300", "more"].iter().zip(&all.by_size) {
+        let _ = writeln!(text, "| {size} | {logs} | {} | {} |", share(*compared, *logs), share(*named, *logs));
+    }
+    text.push_str("\n| confidence in the most probable effect | logs | right |\n|---|---|---|\n");
+    for (mean, right, count) in &all.reliability {
+        let _ =
+            writeln!(text, "| {mean:.2} | {count} | {} |", share((right * f64::from(*count)).round() as u32, *count));
+    }
+    let _ =
+        writeln!(text, "\nOf {} logs with 11 episodes or fewer {} got a wrong and sure name.", all.few[0], all.few[1]);
+    text
+}
+
+/// A share with its 95 % Wilson interval.
+fn share(part: u32, whole: u32) -> String {
+    if whole == 0 {
+        return "–".to_string();
+    }
+    let [low, high] = wilson95(part, whole).map(|bound| 100.0 * bound);
+    format!("{part} of {whole} ({low:.0} to {high:.0} %)")
+}

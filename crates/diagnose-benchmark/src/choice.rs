@@ -1,0 +1,120 @@
+//! Conditional logit with a Gaussian prior (McFadden, "Conditional logit analysis of qualitative choice behavior", 1974).
+//!
+//! Alternative a of choice i has the score xᵢₐ · θ and is chosen with probability softmaxₐ(xᵢₐ · θ).
+
+use nalgebra::{DMatrix, DVector};
+
+/// Steps of Newton's method: the cost is convex.
+const STEPS: usize = 100;
+
+/// What there was to choose from.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Features of each alternative.
+    pub alternatives: Vec<DVector<f64>>,
+    /// Place of the one that was right.
+    pub chosen: usize,
+}
+
+impl Choice {
+    fn shares(&self, theta: &DVector<f64>) -> Vec<f64> {
+        let scores: Vec<f64> = self.alternatives.iter().map(|x| x.dot(theta)).collect();
+        let most = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let exponentials: Vec<f64> = scores.iter().map(|score| (score - most).exp()).collect();
+        let sum: f64 = exponentials.iter().sum();
+        exponentials.into_iter().map(|share| share / sum).collect()
+    }
+}
+
+/// Maximum a posteriori θ, whose components have the prior N(0, `variances`), by damped Newton steps.
+#[must_use]
+pub fn fit(choices: &[Choice], variances: &[f64]) -> DVector<f64> {
+    let size = variances.len();
+    let precision = DVector::from_iterator(size, variances.iter().map(|variance| variance.recip()));
+    let cost = |theta: &DVector<f64>| -> f64 {
+        let prior: f64 = theta.iter().zip(&precision).map(|(x, precision)| 0.5 * precision * x * x).sum();
+        prior + choices.iter().map(|choice| -choice.shares(theta)[choice.chosen].ln()).sum::<f64>()
+    };
+    let mut theta = DVector::zeros(size);
+    let mut now = cost(&theta);
+    for _ in 0..STEPS {
+        let mut slope = theta.component_mul(&precision);
+        let mut curvature = DMatrix::from_diagonal(&precision);
+        for choice in choices {
+            let shares = choice.shares(&theta);
+            let mut mean = DVector::zeros(size);
+            for (x, share) in choice.alternatives.iter().zip(&shares) {
+                mean.axpy(*share, x, 1.0);
+                curvature.ger(*share, x, x, 1.0);
+            }
+            slope += &mean - &choice.alternatives[choice.chosen];
+            curvature.ger(-1.0, &mean, &mean, 1.0);
+        }
+        let Some(step) = curvature.cholesky().map(|cholesky| cholesky.solve(&slope)) else { break };
+        let mut length = 1.0;
+        let next = loop {
+            let next = &theta - length * &step;
+            let found = cost(&next);
+            if found < now || length < 1e-6 {
+                break (next, found);
+            }
+            length *= 0.5;
+        };
+        let gained = now - next.1;
+        if gained > 0.0 {
+            (theta, now) = next;
+        }
+        if gained < 1e-10 {
+            break;
+        }
+    }
+    theta
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit(size: usize, place: usize) -> DVector<f64> {
+        DVector::from_fn(size, |row, _| f64::from(u8::from(row == place)))
+    }
+
+    #[test]
+    fn with_an_offset_each_scores_are_the_logarithms_of_the_frequencies() {
+        let alternatives = || (0..3).map(|place| unit(3, place)).collect();
+        let choices: Vec<Choice> =
+            [0, 0, 0, 0, 0, 0, 1, 1, 1, 2].map(|chosen| Choice { alternatives: alternatives(), chosen }).to_vec();
+        let found = fit(&choices, &[100.0; 3]);
+        // The prior of the offsets draws them together by less than a hundredth.
+        assert!((found[0] - found[1] - 2.0_f64.ln()).abs() < 0.02, "{found}");
+        assert!((found[1] - found[2] - 3.0_f64.ln()).abs() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn at_the_optimum_what_was_chosen_and_what_was_expected_differ_by_the_prior() {
+        // Choices among two to four alternatives with one feature.
+        let choices: Vec<Choice> = (0..40_usize)
+            .map(|i| {
+                let alternatives =
+                    (0..2 + i % 3).map(|a| DVector::from_element(1, ((7 * i + 5 * a) % 11) as f64 / 5.0));
+                Choice { alternatives: alternatives.collect(), chosen: usize::from(i % 5 == 0) }
+            })
+            .collect();
+        let (variance, found) = (0.5, fit(&choices, &[0.5]));
+        let slope: f64 = choices
+            .iter()
+            .map(|choice| {
+                let expected: f64 = choice.alternatives.iter().zip(choice.shares(&found)).map(|(x, p)| p * x[0]).sum();
+                choice.alternatives[choice.chosen][0] - expected
+            })
+            .sum();
+        assert!(found[0] != 0.0 && (slope - found[0] / variance).abs() < 1e-6, "{slope} {found}");
+    }
+
+    #[test]
+    fn what_is_always_chosen_leaves_finite_weights() {
+        let alternatives = vec![DVector::from_element(1, 1.0), DVector::from_element(1, -1.0)];
+        let found = fit(&vec![Choice { alternatives, chosen: 0 }; 4], &[1.0]);
+        assert!(found[0] > 0.3 && found[0] < 3.0, "{found}");
+    }
+}
