@@ -139,7 +139,7 @@ pub(crate) fn promise_known(part: &Study, base: &Fit, mut promises: Vec<Promise>
         return promises;
     }
     let mut variants = Vec::new();
-    for (candidate, own) in known.iter().filter_map(added) {
+    for (candidate, own) in known.iter().filter_map(Fit::added) {
         let Some(promise) = promises.iter_mut().find(|promise| promise.candidate == *candidate) else { continue };
         if candidate.begin.is_some() || variants.contains(&candidate.variant()) {
             continue;
@@ -155,12 +155,6 @@ pub(crate) fn promise_known(part: &Study, base: &Fit, mut promises: Vec<Promise>
     }
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     promises
-}
-
-/// A fit's last effect, and its coordinates.
-fn added(fit: &Fit) -> Option<(&Candidate, &[f64])> {
-    let candidate = fit.model.parts.last()?;
-    Some((candidate, &fit.x[fit.x.len() - candidate.coordinates.len()..]))
 }
 
 /// Coordinates that were simulated.

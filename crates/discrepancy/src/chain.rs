@@ -11,7 +11,7 @@ use crate::fit::{Begin, Effort, Fit, STEPS, fit};
 use crate::model::Model;
 use crate::rival::{Heldout, Rival, Round, first_of_each};
 use crate::screen::{Promise, Screening};
-use crate::search::{NEAR, Search, added_kind};
+use crate::search::{Search, added_kind};
 use crate::study::Study;
 
 /// So many effects make a chain. One alone is compared with its rivals in all episodes.
@@ -35,8 +35,6 @@ pub(crate) struct Link {
     pub(crate) base: Fit,
     /// Whether the first one is a link of a chain.
     pub(crate) holds: bool,
-    /// What the first one gains over the one in whose place it came when all links were known, in the episodes of the screening.
-    pub(crate) exchanged: f64,
 }
 
 impl Link {
@@ -76,54 +74,15 @@ impl Search<'_> {
             }
             gained += gain;
         }
-        self.exchange_links(&part, &mut links);
         self.reserve = 0;
         links
-    }
-
-    /// Puts near rivals in the places of links before the last one: what was compared while others hid is compared again where all are known.
-    fn exchange_links(&self, part: &Study, links: &mut [Link]) {
-        let held = links.iter().filter(|link| link.holds).count();
-        if held < LEAST {
-            return;
-        }
-        let mut at = links[held - 1].quick[0].clone();
-        for place in 0..held - 1 {
-            let link = &links[place];
-            let lead = link.quick[0].log_evidence();
-            let near = |rival: &&Fit| {
-                added_kind(rival).is_some_and(|kind| at.model.parts.iter().all(|part| part.kind() != kind))
-                    && lead - rival.log_evidence() < NEAR
-            };
-            let rivals: Vec<(usize, &Fit)> = link.quick.iter().enumerate().filter(|(_, rival)| near(rival)).collect();
-            let mut best: Option<(usize, Fit)> = None;
-            for (index, rival) in rivals {
-                let Some((model, x)) = replaced(&at, place, rival) else { continue };
-                if !self.affords_both(part, &model) {
-                    break;
-                }
-                let fit = fit(part, model, Begin::at(&x), Effort::Quick);
-                let lead = best.as_ref().map_or(at.log_evidence(), |(_, best)| best.log_evidence());
-                if fit.log_evidence() > lead {
-                    best = Some((index, fit));
-                }
-            }
-            if let Some((index, fit)) = best {
-                links[place].exchanged =
-                    lead - links[place].quick[index].log_evidence() + fit.log_evidence() - at.log_evidence();
-                let rival = links[place].quick.remove(index);
-                links[place].quick.insert(0, rival);
-                links[held - 1].quick[0] = fit.clone();
-                at = fit;
-            }
-        }
     }
 
     /// What could be added to `base`, which knows the episodes of the screening alone, as `part` does. `known`: what was compared before.
     pub(crate) fn link(&self, screening: &Screening, part: &Study, base: &Fit, known: &[Fit]) -> Link {
         let promises = promise_known(part, base, self.promises(screening, part, base), known);
         let quick = self.quick(screening, part, base, &promises);
-        Link { promises, quick, base: base.clone(), holds: false, exchanged: 0.0 }
+        Link { promises, quick, base: base.clone(), holds: false }
     }
 
     /// Whether the budget suffices to look for an effect beside those of a model, and for what they come to together.
@@ -185,32 +144,15 @@ impl Search<'_> {
     fn rivals(&self, screening: &Screening, link: &Link) -> Vec<Rival> {
         let share = self.share(screening);
         let first = link.base.model.parts.is_empty();
-        let rival = |(rank, fit): (usize, &Fit)| Rival {
-            gain: share
-                * (fit.log_evidence() - link.base.log_evidence() + if rank == 0 { link.exchanged } else { 0.0 }),
+        let rival = |fit: &Fit| Rival {
+            gain: share * (fit.log_evidence() - link.base.log_evidence()),
             // Nothing is decided by those of further effects.
             heldout: if first { self.heldout(fit) } else { Heldout::default() },
             fit: fit.clone(),
             whole: false,
         };
-        let mut rivals: Vec<Rival> = link.quick.iter().enumerate().map(rival).collect();
+        let mut rivals: Vec<Rival> = link.quick.iter().map(rival).collect();
         first_of_each(&mut rivals, |rival| added_kind(&rival.fit));
         rivals
     }
-}
-
-/// The model of `at` with the last effect of `rival` in place of its own there, and where both are.
-fn replaced(at: &Fit, place: usize, rival: &Fit) -> Option<(Model, Vec<f64>)> {
-    let other = rival.model.parts.last()?;
-    let own = &rival.x[rival.x.len() - other.coordinates.len()..];
-    let first = at.x.len() - at.model.parts.iter().map(|part| part.coordinates.len()).sum::<usize>();
-    let (mut model, mut x) = (at.model.clone(), at.x[..first].to_vec());
-    let mut from = first;
-    for (index, part) in at.model.parts.iter().enumerate() {
-        let to = from + part.coordinates.len();
-        x.extend_from_slice(if index == place { own } else { &at.x[from..to] });
-        from = to;
-    }
-    model.parts[place] = other.clone();
-    Some((model, x))
 }

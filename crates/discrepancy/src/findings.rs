@@ -89,8 +89,8 @@ impl Findings {
         };
         let gains: Vec<f64> =
             round.base.residuals.costs().iter().zip(&costs).map(|(before, after)| before - after).collect();
-        let part = rival.fit.model.parts.last();
-        let own = part.map_or(&[][..], |part| &rival.fit.x[rival.fit.x.len() - part.coordinates.len()..]);
+        let (part, own) = rival.fit.added().unzip();
+        let own = own.unwrap_or_default();
         let strengths = part.into_iter().flat_map(Candidate::strengths).map(|index| own[index].abs());
         Self {
             effect: rival.kind().name().into(),

@@ -3,6 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::candidate::Candidate;
 use crate::likelihood::{self, Stack, dot, pick, weights};
 use crate::model::{Model, STEP};
 use crate::study::{Study, difference};
@@ -46,6 +47,13 @@ impl Fit {
         let raw = places.iter().map(|place| self.raw[*place].clone()).collect();
         let jacobian = self.jacobian.iter().map(|column| pick(column, places)).collect();
         Self::new(self.model.clone(), self.x.clone(), raw, pick(&self.residuals, places), jacobian)
+    }
+
+    /// The last effect of its model, and the coordinates of that.
+    #[must_use]
+    pub fn added(&self) -> Option<(&Candidate, &[f64])> {
+        let candidate = self.model.parts.last()?;
+        Some((candidate, &self.x[self.x.len() - candidate.coordinates.len()..]))
     }
 
     /// −ln posterior there, but for a constant.

@@ -26,7 +26,7 @@ mod retune;
 const SECOND_SHARE: f64 = 0.01;
 const LEAST_SECOND_SHARE: f64 = 0.0025;
 /// Rivals nearer than this in ln evidence on the episodes of the screening are fitted with care.
-pub(crate) const NEAR: f64 = 60.0;
+const NEAR: f64 = 60.0;
 /// What keeps this share of what it promised in the episodes of the screening says what others would keep.
 const MOST_KEEP: f64 = 0.5;
 /// If an effect gains more than this in ln evidence of the episodes of the screening, a model without was no place to learn errors at.
@@ -215,8 +215,7 @@ impl Search<'_> {
     /// Puts a rival of the first effect in its place where that does better beside the second: which of those it was is plainer there.
     fn exchange(&self, screening: &Screening, [first, second]: [&mut Round; 2], episodes: &Episodes) {
         let Some((pair, _)) = second.rivals.split_first_mut() else { return };
-        let Some(added) = pair.fit.model.parts.last().cloned() else { return };
-        let own = pair.fit.x[pair.fit.x.len() - added.coordinates.len()..].to_vec();
+        let Some((added, own)) = pair.fit.added().map(|(added, own)| (added.clone(), own.to_vec())) else { return };
         let part = self.study.part(&screening.places);
         let beside = |rival: &Rival| -> Option<Fit> {
             let x = [rival.fit.x.as_slice(), &own].concat();
@@ -272,7 +271,7 @@ impl Search<'_> {
     }
 
     /// Whether it is, and after it one to all episodes.
-    pub(crate) fn affords_both(&self, part: &Study, model: &Model) -> bool {
+    fn affords_both(&self, part: &Study, model: &Model) -> bool {
         let rollouts = part.rollouts() + self.study.rollouts();
         self.study.affords((model.simulated() + STEPS + 1) * rollouts + self.reserve)
     }

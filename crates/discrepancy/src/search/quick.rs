@@ -114,7 +114,6 @@ impl Search<'_> {
 
 /// Whether a fit's last effect is more than negligible: what is as good as absent lasts nowhere, and is not worth a fit with care.
 fn is_there(fit: &Fit) -> bool {
-    let Some(part) = fit.model.parts.last() else { return false };
-    let own = &fit.x[fit.x.len() - part.coordinates.len()..];
+    let Some((part, own)) = fit.added() else { return false };
     part.begin.is_some() || part.strengths().any(|index| own[index].abs() > NEGLIGIBLE)
 }

@@ -34,8 +34,7 @@ impl Search<'_> {
     /// The model without the last effect of `rival` where re-tuning can do the same, fitted from there, if that is better than `base`: no effect may be
     /// named because re-tuning had not gone far enough.
     fn retuned(&self, base: &Fit, rival: &Fit) -> Option<Fit> {
-        let part = rival.model.parts.last()?;
-        let coordinates = &rival.x[rival.x.len() - part.coordinates.len()..];
+        let (part, coordinates) = rival.added()?;
         let tunables = &self.study.simulator.nominal.tunables;
         let place = |key: &str| tunables.iter().position(|tunable| tunable.key == key);
         let value = |place: usize| tunables[place].value(rival.x[place]);
