@@ -64,6 +64,7 @@ pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Be
     let (found, candidate) = (best.model.parts.last()?, model.parts.last()?);
     let (shared, own) = best.x.split_at(best.x.len() - found.coordinates.len());
     let z = &shared[..best.model.tunables];
+    let has_tool = part.simulator.nominal.has_tool();
     let begin = match (found.effect(own), candidate.kind()) {
         // Exactly: a slope s pulls at a mass m with m g s.
         (EffectConfig::ConstantForce(force), EffectKind::TableTilt) => {
@@ -82,6 +83,13 @@ pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Be
             let pull = [x - tether.anchor_x_m, y - tether.anchor_y_m].map(|off| -tether.stiffness_npm * off);
             let weight_n = if candidate.kind() == EffectKind::TableTilt { weight_n(part, z) } else { 1.0 };
             candidate.coordinates_of(&pull.map(|force_n| force_n / weight_n))
+        }
+        // In free flight distances read s times as long are what a clock r times as fast reads, s = 1 / r².
+        (EffectConfig::TimeBase(clock), EffectKind::PoseScale) if !has_tool => {
+            candidate.coordinates_of(&[clock.rate.powi(-2)])
+        }
+        (EffectConfig::PoseScale(pose), EffectKind::TimeBase) if !has_tool => {
+            candidate.coordinates_of(&[pose.scale.powf(-0.5)])
         }
         _ => translate(part, z, (found, own), candidate)?,
     };

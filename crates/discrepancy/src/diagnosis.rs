@@ -44,7 +44,9 @@ const EPISODES: usize = 40;
 /// What the search leaves to the screening, in simulations of each of its episodes: about as many as the catalogue has strengths and places, and half as many again for scans.
 const SCREENED: usize = 130;
 /// The same of what is thrown: fewer effects show.
-const SCREENED_THROWN: usize = 80;
+const SCREENED_THROWN: usize = 40;
+/// Kinds of which the first of several effects of what is thrown is chosen: each further one costs what a further effect does.
+const QUICK_FITS_THROWN: usize = 4;
 
 /// What the search may do.
 #[derive(Clone, Debug)]
@@ -100,6 +102,7 @@ impl Settings {
         Self {
             effects,
             looks: self.looks.min(self.quick_fits),
+            quick_fits: self.quick_fits.min(QUICK_FITS_THROWN),
             rollouts: self.most,
             threshold: self.threshold.max(self.threshold_rolling),
             ..self.clone()
