@@ -420,7 +420,7 @@ mod tests {
     fn recorded(set: &str) -> Log {
         let logs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
         let mut log = measured_log::read(&logs.join(set)).unwrap();
-        log.episodes.truncate(12);
+        log.episodes.truncate(8);
         log
     }
 
@@ -456,17 +456,13 @@ mod tests {
     fn what_else_the_catalogue_has_and_in_which_order_changes_no_answer() {
         let log = recorded("set-003");
         let plain = answer(&log, |all| all);
-        let reversed = |mut all: Vec<Candidate>| {
+        let other = |mut all: Vec<Candidate>| {
             all.reverse();
-            all
-        };
-        assert_eq!(answer(&log, reversed), plain, "reversed");
-        // Of one kind one is fitted, however many there are.
-        let more = |mut all: Vec<Candidate>| {
+            // Of one kind one is fitted, however many there are.
             let leak = all.iter().find(|candidate| candidate.kind() == EffectKind::MassLeak).cloned();
             all.extend(std::iter::repeat_n(leak, 20).flatten());
             all
         };
-        assert_eq!(answer(&log, more), plain, "more");
+        assert_eq!(answer(&log, other), plain);
     }
 }
