@@ -55,7 +55,8 @@ const TWINS: [[EffectKind; 2]; 9] = [
 ];
 
 /// Whether two kinds of effects do nearly the same.
-pub(crate) fn are_twins(kinds: [EffectKind; 2]) -> bool {
+#[must_use]
+pub fn are_twins(kinds: [EffectKind; 2]) -> bool {
     TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]])
 }
 
