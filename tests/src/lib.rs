@@ -54,16 +54,22 @@ pub fn program(binary: &str) -> Command {
 ///
 /// If they cannot be written.
 pub fn short_log() -> &'static Path {
-    const EPISODES: u32 = 6;
+    const EPISODES: usize = 6;
+    const ROWS: usize = 64;
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     let made = MADE.get_or_init(|| {
         let (from, folder) =
             (root().join("tests/data/mujoco-logs/logs/set-003"), tempfile::tempdir().expect("a folder"));
         std::fs::copy(from.join("log.toml"), folder.path().join("log.toml")).expect("a recorded log");
         let samples = std::fs::read_to_string(from.join("samples.csv")).expect("a recorded log");
-        // The header has no number.
-        let first = |line: &&str| line.split(',').next().is_some_and(|id| id.parse().unwrap_or(0_u32) < EPISODES);
-        let short: String = samples.lines().filter(first).flat_map(|line| [line, "\n"]).collect();
+        let mut rows = [0; EPISODES];
+        let mut first = |line: &&str| {
+            // The header has no number.
+            let id = line.split(',').next().and_then(|id| id.parse::<usize>().ok());
+            let Some(id) = id else { return true };
+            rows.get_mut(id).is_some_and(|row| std::mem::replace(row, *row + 1) < ROWS)
+        };
+        let short: String = samples.lines().filter(|line| first(line)).flat_map(|line| [line, "\n"]).collect();
         std::fs::write(folder.path().join("samples.csv"), short).expect("room for a log");
         folder
     });

@@ -14,6 +14,8 @@ pub struct Choice {
     pub alternatives: Vec<DVector<f64>>,
     /// Place of the one that was right.
     pub chosen: usize,
+    /// How often it counts.
+    pub weight: f64,
 }
 
 impl Choice {
@@ -33,7 +35,7 @@ pub fn fit(choices: &[Choice], variances: &[f64]) -> DVector<f64> {
     let precision = DVector::from_iterator(size, variances.iter().map(|variance| variance.recip()));
     let cost = |theta: &DVector<f64>| -> f64 {
         let prior: f64 = theta.iter().zip(&precision).map(|(x, precision)| 0.5 * precision * x * x).sum();
-        prior + choices.iter().map(|choice| -choice.shares(theta)[choice.chosen].ln()).sum::<f64>()
+        prior + choices.iter().map(|choice| -choice.weight * choice.shares(theta)[choice.chosen].ln()).sum::<f64>()
     };
     let mut theta = DVector::zeros(size);
     let mut now = cost(&theta);
@@ -45,10 +47,10 @@ pub fn fit(choices: &[Choice], variances: &[f64]) -> DVector<f64> {
             let mut mean = DVector::zeros(size);
             for (x, share) in choice.alternatives.iter().zip(&shares) {
                 mean.axpy(*share, x, 1.0);
-                curvature.ger(*share, x, x, 1.0);
+                curvature.ger(choice.weight * share, x, x, 1.0);
             }
-            slope += &mean - &choice.alternatives[choice.chosen];
-            curvature.ger(-1.0, &mean, &mean, 1.0);
+            slope += choice.weight * (&mean - &choice.alternatives[choice.chosen]);
+            curvature.ger(-choice.weight, &mean, &mean, 1.0);
         }
         let Some(step) = curvature.cholesky().map(|cholesky| cholesky.solve(&slope)) else { break };
         let mut length = 1.0;
@@ -82,12 +84,21 @@ mod tests {
     #[test]
     fn with_an_offset_each_scores_are_the_logarithms_of_the_frequencies() {
         let alternatives = || (0..3).map(|place| unit(3, place)).collect();
-        let choices: Vec<Choice> =
-            [0, 0, 0, 0, 0, 0, 1, 1, 1, 2].map(|chosen| Choice { alternatives: alternatives(), chosen }).to_vec();
+        let choices: Vec<Choice> = [0, 0, 0, 0, 0, 0, 1, 1, 1, 2]
+            .map(|chosen| Choice { alternatives: alternatives(), chosen, weight: 1.0 })
+            .to_vec();
         let found = fit(&choices, &[100.0; 3]);
         // The prior of the offsets draws them together by less than a hundredth.
         assert!((found[0] - found[1] - 2.0_f64.ln()).abs() < 0.02, "{found}");
         assert!((found[1] - found[2] - 3.0_f64.ln()).abs() < 0.05, "{found}");
+    }
+
+    #[test]
+    fn one_that_counts_twice_is_two() {
+        let choice = |chosen, weight| Choice { alternatives: vec![unit(2, 0), unit(2, 1)], chosen, weight };
+        let twice = fit(&[choice(0, 2.0), choice(1, 1.0)], &[1.0; 2]);
+        let two = fit(&[choice(0, 1.0), choice(0, 1.0), choice(1, 1.0)], &[1.0; 2]);
+        assert!((twice - two).norm() < 1e-9);
     }
 
     #[test]
@@ -97,7 +108,7 @@ mod tests {
             .map(|i| {
                 let alternatives =
                     (0..2 + i % 3).map(|a| DVector::from_element(1, ((7 * i + 5 * a) % 11) as f64 / 5.0));
-                Choice { alternatives: alternatives.collect(), chosen: usize::from(i % 5 == 0) }
+                Choice { alternatives: alternatives.collect(), chosen: usize::from(i % 5 == 0), weight: 1.0 }
             })
             .collect();
         let (variance, found) = (0.5, fit(&choices, &[0.5]));
@@ -114,7 +125,7 @@ mod tests {
     #[test]
     fn what_is_always_chosen_leaves_finite_weights() {
         let alternatives = vec![DVector::from_element(1, 1.0), DVector::from_element(1, -1.0)];
-        let found = fit(&vec![Choice { alternatives, chosen: 0 }; 4], &[1.0]);
+        let found = fit(&vec![Choice { alternatives, chosen: 0, weight: 1.0 }; 4], &[1.0]);
         assert!(found[0] > 0.3 && found[0] < 3.0, "{found}");
     }
 }

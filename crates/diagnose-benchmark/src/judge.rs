@@ -47,6 +47,20 @@ pub struct Judged {
     pub seconds: f64,
 }
 
+/// Of logs whose effect was withheld from what was compared: how many, how many are called `unknown`, how many get a name, and one with a confidence of 0.9
+/// and more.
+#[must_use]
+pub fn judge_withheld(judged: &[(&Example, Probabilities)]) -> [u32; 4] {
+    use discrepancy::Verdict;
+    let count = |of: &dyn Fn(&Probabilities) -> bool| judged.iter().filter(|(_, found)| of(found)).count() as u32;
+    [
+        judged.len() as u32,
+        count(&|found| found.verdict() == Verdict::Unknown),
+        count(&|found| found.verdict() == Verdict::Effect),
+        count(&|found| found.best().1 >= 0.9),
+    ]
+}
+
 /// Counts over judged examples.
 #[must_use]
 pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {

@@ -2,6 +2,9 @@
 //!
 //! Logs of other engines: a folder holds `log-NNN/` and `truth/log-NNN.json`, as `tests/peers/worlds/make_logs.py` writes them; answers lie in `ANSWERS/FOLDER/log-NNN/report.json`.
 //! What is learnt is judged on the engine that was left out, each in turn.
+//!
+//! Few logs hide what the catalogue lacks. So every log whose effect was compared teaches a second time, as if that effect were not in the catalogue: then
+//! something else is missing. All of these together weigh as much as the logs that hide something else.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,9 +13,9 @@ use anyhow::{Context as _, Result};
 use discrepancy::decision::{
     Decision, EFFECT_FEATURES, LOG_FEATURES, Probabilities, Scale, Score, effect_features, log_features, standardised,
 };
-use discrepancy::findings::Findings;
+use discrepancy::{are_twins, findings::Findings};
 use nalgebra::DVector;
-use physics_model::EffectConfig;
+use physics_model::{EffectConfig, EffectKind};
 use serde::{Deserialize, Serialize};
 
 use crate::choice::{self, Choice};
@@ -145,9 +148,30 @@ pub struct Example {
     pub rollouts: u64,
     /// Duration, s.
     pub seconds: f64,
+    /// Whether what it hides was withheld from what was compared.
+    pub withheld: bool,
 }
 
 impl Example {
+    /// The same log as if the catalogue had neither what it hides nor what does nearly the same: something else is missing. `None` where the search did not
+    /// compare it, or nothing else.
+    #[must_use]
+    pub fn without_truth(&self) -> Option<Self> {
+        if self.truth.kind() != Kind::Effect || self.label() >= self.findings.len() {
+            return None;
+        }
+        let kind = |name: &str| name.parse::<EffectKind>().ok();
+        let same = |found: &Findings, hidden: &Named| {
+            found.effect == hidden.name
+                || kind(&found.effect).zip(kind(&hidden.name)).is_some_and(|(a, b)| are_twins([a, b]))
+        };
+        let mut other = Self { withheld: true, ..self.clone() };
+        let hidden = std::mem::take(&mut other.truth.effects);
+        other.findings.retain(|found| !hidden.iter().any(|hidden| same(found, hidden)));
+        other.truth.outside = hidden.into_iter().map(|hidden| hidden.name.into()).collect();
+        (!other.findings.is_empty()).then_some(other)
+    }
+
     /// The alternative that it teaches: the place of the effect that is right among those that were compared; then nothing, then something else.
     pub(crate) fn label(&self) -> usize {
         let compared = self.findings.len();
@@ -257,7 +281,7 @@ fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
             named.parameters.iter().filter_map(holds).collect::<Vec<_>>()
         })
         .collect();
-    Some(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds })
+    Some(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds, withheld: false })
 }
 
 /// The decision that examples teach. How far weights may go is what predicts best the engines among them that are left out, each in turn.
@@ -301,14 +325,14 @@ fn scales(names: &[&str], rows: &[Vec<f64>]) -> Vec<Scale> {
 }
 
 fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) -> Decision {
-    let of_effects = |example: &&Example| -> Vec<Vec<f64>> {
+    let of_effects = |example: &Example| -> Vec<Vec<f64>> {
         let most = most(&example.findings);
         example.findings.iter().map(|found| effect_features(found, most).to_vec()).collect()
     };
-    let effects: Vec<Vec<Vec<f64>>> = examples.iter().map(of_effects).collect();
-    let logs: Vec<Vec<f64>> = examples.iter().map(|example| log_features(&example.findings).to_vec()).collect();
-    let of_effects = scales(&EFFECT_FEATURES, &effects.concat());
-    let of_logs = scales(&LOG_FEATURES, &logs);
+    let of_log = |example: &Example| log_features(&example.findings).to_vec();
+    let rows: Vec<Vec<f64>> = examples.iter().flat_map(|example| of_effects(example)).collect();
+    let effect_scales = scales(&EFFECT_FEATURES, &rows);
+    let log_scales = scales(&LOG_FEATURES, &examples.iter().map(|example| of_log(example)).collect::<Vec<_>>());
     // Offset and weights of the score of an effect, of nothing and of something else, one after another.
     let sizes = [EFFECT_FEATURES.len(), LOG_FEATURES.len(), LOG_FEATURES.len()].map(|count| 1 + count);
     let firsts = [0, sizes[0], sizes[0] + sizes[1]];
@@ -318,13 +342,19 @@ fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) 
         x.rows_mut(firsts[class] + 1, standard.len()).copy_from_slice(&standard);
         x
     };
-    let choice = |((example, effects), log): ((&&Example, &Vec<Vec<f64>>), &Vec<f64>)| {
-        let effects = effects.iter().map(|row| alternative(0, standardised(row, &of_effects).collect()));
-        let log: Vec<f64> = standardised(log, &of_logs).collect();
+    let choice = |example: &Example, weight: f64| {
+        let rows = of_effects(example);
+        let effects = rows.iter().map(|row| alternative(0, standardised(row, &effect_scales).collect()));
+        let log: Vec<f64> = standardised(&of_log(example), &log_scales).collect();
         let alternatives = effects.chain([alternative(1, log.clone()), alternative(2, log)]).collect();
-        Choice { alternatives, chosen: example.label() }
+        Choice { alternatives, chosen: example.label(), weight }
     };
-    let choices: Vec<Choice> = examples.iter().zip(&effects).zip(&logs).map(choice).collect();
+    let withheld: Vec<Example> = examples.iter().filter_map(|example| example.without_truth()).collect();
+    let outside = examples.iter().filter(|example| example.truth.kind() == Kind::Outside).count();
+    let weight = outside as f64 / withheld.len().max(1) as f64;
+    let choices: Vec<Choice> = (examples.iter().map(|example| choice(example, 1.0)))
+        .chain(withheld.iter().map(|example| choice(example, weight.min(1.0))))
+        .collect();
     let variances: Vec<f64> =
         (0..sizes.iter().sum()).map(|place| if firsts.contains(&place) { OFFSET } else { variance }).collect();
     let theta = choice::fit(&choices, &variances);
@@ -337,21 +367,21 @@ fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) 
         effect: score(0),
         none: score(1),
         unknown: score(2),
-        effect_features: of_effects,
-        log_features: of_logs,
+        effect_features: effect_scales,
+        log_features: log_scales,
     }
 }
 
-/// Every example with the probabilities of what the other engines teach.
+/// Every example of `judged` with the probabilities of what the other engines of `taught` teach.
 #[must_use]
-pub fn leave_one_engine_out(examples: &[Example]) -> Vec<(&Example, Probabilities)> {
-    let judged = |engine: &str| {
-        let others: Vec<&Example> = examples.iter().filter(|example| example.truth.engine != engine).collect();
+pub fn leave_one_engine_out<'a>(taught: &[Example], judged: &'a [Example]) -> Vec<(&'a Example, Probabilities)> {
+    let of_engine = |engine: &str| {
+        let others: Vec<&Example> = taught.iter().filter(|example| example.truth.engine != engine).collect();
         let decision = learn(&others, serde_json::Value::Null);
-        let own = examples.iter().filter(|example| example.truth.engine == engine);
+        let own = judged.iter().filter(|example| example.truth.engine == engine);
         own.map(|example| (example, decision.probabilities(&example.findings))).collect::<Vec<_>>()
     };
-    engines(&examples.iter().collect::<Vec<_>>()).into_iter().flat_map(judged).collect()
+    engines(&judged.iter().collect::<Vec<_>>()).into_iter().flat_map(of_engine).collect()
 }
 
 #[cfg(test)]
@@ -391,7 +421,15 @@ mod tests {
             size: 1.0,
             episodes: [20, 4],
         }];
-        Example { log: "log".into(), truth, findings, covered: vec![true], rollouts: 100, seconds: 1.0 }
+        Example {
+            log: "log".into(),
+            truth,
+            findings,
+            covered: vec![true],
+            rollouts: 100,
+            seconds: 1.0,
+            withheld: false,
+        }
     }
 
     #[test]
@@ -403,14 +441,30 @@ mod tests {
                 examples.push(example(engine, false, "tether", 2.0 + f64::from(size)));
             }
         }
-        let judged = judge(&leave_one_engine_out(&examples));
+        let judged = judge(&leave_one_engine_out(&examples, &examples));
         assert_eq!((judged.effects, judged.none, judged.false_alarms), ([30, 30], [30, 30], 0));
         assert!(judged.calibration_error < 0.2 && judged.sure_and_wrong == 0, "{judged:?}");
         // On an engine where evidence says nothing the answers are wrong, and the table says so.
         examples.extend((0..10).map(|_| example("d", false, "tether", 300.0)));
-        let judged = leave_one_engine_out(&examples);
+        let judged = leave_one_engine_out(&examples, &examples);
         let own: Vec<_> = judged.into_iter().filter(|(example, _)| example.truth.engine == "d").collect();
         assert_eq!(judge(&own).false_alarms, 10);
+    }
+
+    #[test]
+    fn a_log_without_its_effect_in_the_catalogue_misses_something_else() {
+        let mut log = example("a", true, "table_tilt", 100.0);
+        // Nothing else was compared.
+        assert!(log.without_truth().is_none());
+        for other in ["constant_force", "viscous_damping"] {
+            let found = Findings { effect: other.into(), ..log.findings[0].clone() };
+            log.findings.push(found);
+        }
+        let without = log.without_truth().unwrap();
+        let left: Vec<&str> = without.findings.iter().map(|found| found.effect.as_str()).collect();
+        // A constant force does what a tilt does.
+        assert_eq!((left, without.truth.kind(), without.label()), (vec!["viscous_damping"], Kind::Outside, 2));
+        assert!(without.withheld && without.without_truth().is_none());
     }
 
     #[test]

@@ -55,7 +55,8 @@ const TWINS: [[EffectKind; 2]; 9] = [
 ];
 
 /// Whether two kinds of effects do nearly the same.
-pub(crate) fn are_twins(kinds: [EffectKind; 2]) -> bool {
+#[must_use]
+pub fn are_twins(kinds: [EffectKind; 2]) -> bool {
     TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]])
 }
 
@@ -64,6 +65,7 @@ pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Be
     let (found, candidate) = (best.model.parts.last()?, model.parts.last()?);
     let (shared, own) = best.x.split_at(best.x.len() - found.coordinates.len());
     let z = &shared[..best.model.tunables];
+    let has_tool = part.simulator.nominal.has_tool();
     let begin = match (found.effect(own), candidate.kind()) {
         // Exactly: a slope s pulls at a mass m with m g s.
         (EffectConfig::ConstantForce(force), EffectKind::TableTilt) => {
@@ -82,6 +84,13 @@ pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Be
             let pull = [x - tether.anchor_x_m, y - tether.anchor_y_m].map(|off| -tether.stiffness_npm * off);
             let weight_n = if candidate.kind() == EffectKind::TableTilt { weight_n(part, z) } else { 1.0 };
             candidate.coordinates_of(&pull.map(|force_n| force_n / weight_n))
+        }
+        // In free flight distances read s times as long are what a clock r times as fast reads, s = 1 / r².
+        (EffectConfig::TimeBase(clock), EffectKind::PoseScale) if !has_tool => {
+            candidate.coordinates_of(&[clock.rate.powi(-2)])
+        }
+        (EffectConfig::PoseScale(pose), EffectKind::TimeBase) if !has_tool => {
+            candidate.coordinates_of(&[pose.scale.powf(-0.5)])
         }
         _ => translate(part, z, (found, own), candidate)?,
     };
@@ -121,13 +130,39 @@ fn friction_for_mass(part: &Study, base: &Fit, candidate: &Candidate) -> Option<
     Some(x)
 }
 
-/// A friction that re-tuning replaced by a mass promises what it gains in its place, if that is more than what a small step does.
-pub(crate) fn promise_friction(part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Promise> {
+/// Delays that begin where re-tuning had a clock late for them, and beyond, where no clock goes. None where it is not late.
+fn delay_for_clock<'a>(
+    part: &'a Study,
+    base: &'a Fit,
+    candidate: &'a Candidate,
+) -> impl Iterator<Item = Vec<f64>> + 'a {
+    let nominal = part.simulator.nominal;
+    nominal.replaced_by(candidate.kind()).flat_map(move |clock| {
+        let late_secs = nominal.tunables[clock].value(base.x[clock]);
+        let longer: &[f64] = if late_secs > 0.0 { &[1.0, 1.5, 2.25] } else { &[] };
+        longer.iter().map(move |share| {
+            let mut x = base.x.clone();
+            x[clock] = 0.0;
+            x.extend(candidate.coordinates_of(&[share * late_secs]));
+            x
+        })
+    })
+}
+
+/// Where a candidate does what re-tuning had to do in its place.
+fn in_place(part: &Study, base: &Fit, candidate: &Candidate) -> Vec<Vec<f64>> {
+    friction_for_mass(part, base, candidate).into_iter().chain(delay_for_clock(part, base, candidate)).collect()
+}
+
+/// What re-tuning did in the place of an effect is what that promises, if it is more than what a small step does.
+pub(crate) fn promise_in_place(part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Promise> {
     let mut promises = promises.to_vec();
     for promise in &mut promises {
-        let Some(x) = friction_for_mass(part, base, &promise.candidate) else { continue };
-        let gained = base.cost() - simulated(part, &base.model.with(&promise.candidate), x).cost;
-        promise.gain = promise.gain.max(gained * promise.episodes as f64 / part.chosen.len() as f64);
+        let model = base.model.with(&promise.candidate);
+        let share = promise.episodes as f64 / part.chosen.len() as f64;
+        let gains = (in_place(part, base, &promise.candidate).into_iter())
+            .map(|x| share * (base.cost() - simulated(part, &model, x).cost));
+        promise.gain = gains.fold(promise.gain, f64::max);
     }
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     promises
@@ -232,7 +267,7 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
             }
         }
     }
-    tried.extend(friction_for_mass(part, base, &promise.candidate).map(simulated));
+    tried.extend(in_place(part, base, &promise.candidate).into_iter().map(simulated));
     let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     let Place { mut x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
     let mut jacobian = base.jacobian.clone();

@@ -21,8 +21,8 @@ const LEAST: usize = 2;
 /// three effects spurious ones gained up to 2.6 %, true ones 4.5 % and more.
 pub(crate) const LEAST_SHARE: f64 = 0.03;
 
-/// Coordinates of an effect of what is thrown, and kinds that are fitted beside another one: most have fewer.
-const COORDINATES: usize = 3;
+/// Coordinates of an effect of what is thrown, as most have them, and kinds that are fitted beside another one.
+const COORDINATES: usize = 1;
 const KINDS: usize = 3;
 
 /// What is compared to be added to a model, in the episodes of the screening.

@@ -14,7 +14,7 @@ use crate::findings::Findings;
 use crate::report::Verdict;
 
 /// Names of the features of an effect, in order.
-pub const EFFECT_FEATURES: [&str; 14] = [
+pub const EFFECT_FEATURES: [&str; 15] = [
     "ln evidence",
     "ln behind",
     "steadiness",
@@ -26,6 +26,7 @@ pub const EFFECT_FEATURES: [&str; 14] = [
     "ln motion share",
     "ln force share",
     "ln size",
+    "size",
     "coordinates",
     "ln evidence, explained",
     "steadiness, explained",
@@ -36,6 +37,8 @@ pub const LOG_FEATURES: [&str; 4] = ["ln before", "ln motion share", "ln force s
 
 /// No evidence and no error is larger to a decision.
 const MOST: f64 = 1e6;
+/// No strength says more, in standard deviations of its prior.
+const FARTHEST: f64 = 12.0;
 
 // Numbers that say no more beyond a point are held there; what is no number is as far out as can be.
 fn held(value: f64, least: f64, most: f64) -> f64 {
@@ -65,6 +68,8 @@ pub fn effect_features(findings: &Findings, most: f64) -> [f64; EFFECT_FEATURES.
         logarithm(findings.motion_share[1], 1e-3),
         logarithm(findings.force_share[1], 1e-2),
         logarithm(findings.size, 1e-2),
+        // Hardly any is far beyond its prior: what is fitted that strong stands for something else.
+        held(findings.size, 0.0, FARTHEST),
         held(findings.coordinates as f64, 0.0, 4.0),
         explained * gain(findings.log_evidence),
         explained * bounded(findings.steadiness, 6.0),

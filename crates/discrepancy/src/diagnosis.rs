@@ -44,7 +44,9 @@ const EPISODES: usize = 40;
 /// What the search leaves to the screening, in simulations of each of its episodes: about as many as the catalogue has strengths and places, and half as many again for scans.
 const SCREENED: usize = 130;
 /// The same of what is thrown: fewer effects show.
-const SCREENED_THROWN: usize = 80;
+const SCREENED_THROWN: usize = 40;
+/// Kinds of which the first of several effects of what is thrown is chosen: each further one costs what a further effect does.
+const QUICK_FITS_THROWN: usize = 4;
 
 /// What the search may do.
 #[derive(Clone, Debug)]
@@ -100,6 +102,7 @@ impl Settings {
         Self {
             effects,
             looks: self.looks.min(self.quick_fits),
+            quick_fits: self.quick_fits.min(QUICK_FITS_THROWN),
             rollouts: self.most,
             threshold: self.threshold.max(self.threshold_rolling),
             ..self.clone()
@@ -417,7 +420,7 @@ mod tests {
     fn recorded(set: &str) -> Log {
         let logs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
         let mut log = measured_log::read(&logs.join(set)).unwrap();
-        log.episodes.truncate(12);
+        log.episodes.truncate(8);
         log
     }
 
@@ -453,17 +456,13 @@ mod tests {
     fn what_else_the_catalogue_has_and_in_which_order_changes_no_answer() {
         let log = recorded("set-003");
         let plain = answer(&log, |all| all);
-        let reversed = |mut all: Vec<Candidate>| {
+        let other = |mut all: Vec<Candidate>| {
             all.reverse();
-            all
-        };
-        assert_eq!(answer(&log, reversed), plain, "reversed");
-        // Of one kind one is fitted, however many there are.
-        let more = |mut all: Vec<Candidate>| {
+            // Of one kind one is fitted, however many there are.
             let leak = all.iter().find(|candidate| candidate.kind() == EffectKind::MassLeak).cloned();
             all.extend(std::iter::repeat_n(leak, 20).flatten());
             all
         };
-        assert_eq!(answer(&log, more), plain, "more");
+        assert_eq!(answer(&log, other), plain);
     }
 }

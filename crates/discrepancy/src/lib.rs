@@ -85,6 +85,7 @@ use measured_log::{Axis, Channel, Log, Robot};
 use physics_model::rig::RigTool;
 use physics_model::robot::{Robot as Arm, RobotConfig, find_root};
 
+pub use begin::are_twins;
 pub use diagnosis::{Diagnosis, Settings, diagnose, diagnose_watched};
 pub use error::Error;
 pub use model_file::ModelFile;

@@ -23,7 +23,7 @@ const LONG: f64 = 3.0;
 
 /// How far from neutral, in units, a linear step is measured: far enough to stand out of the solver's grain.
 const REACH: f64 = 0.35;
-/// Episodes of the screening in which strengths are scanned, at most.
+/// Episodes of the screening in which strengths are scanned, at most; none of what is thrown, whose budget several effects share.
 const SCANNED: usize = 4;
 /// Strengths that are looked at, in units, either way as far as they are within the range...
 const STRENGTHS: [f64; 2] = [0.5, 2.0];
@@ -118,9 +118,12 @@ impl Screening {
             }
         };
         let before: Vec<Vec<f64>> = scanned.iter().map(|place| base[*place].clone()).collect();
+        let has_tool = part.simulator.nominal.has_tool();
+        let points =
+            |candidate: &Candidate| if has_tool { scan(&few, &before, nominal, candidate) } else { Vec::new() };
         let one = |candidate: &Candidate| Screened {
             columns: columns(candidate),
-            points: scan(&few, &before, nominal, candidate),
+            points: points(candidate),
             candidate: candidate.clone(),
         };
         let screened = candidates.iter().map(one).collect();

@@ -59,6 +59,19 @@ fn a_tool_that_is_stamped_late_is_a_skew_and_no_effect() {
 }
 
 #[test]
+fn a_camera_later_than_any_clock_is_named_beside_what_else_is_missing() {
+    let object = |channel| matches!(channel, Channel::ObjectPosition(_) | Channel::ObjectOrientation(_));
+    let mut log = late(log("set-003"), object, 4);
+    log.episodes.truncate(12);
+    let found = report(&log);
+    let mut named = names(&found);
+    named.sort_unstable();
+    assert_eq!(named, ["pose_delay", "table_tilt"], "{}", found.summary);
+    let delay = found.effects.iter().flat_map(|effect| &effect.parameters).find(|value| value.key == "delay_secs");
+    assert!(delay.is_some_and(|delay| (delay.value - 0.08).abs() < 0.006), "{delay:?}");
+}
+
+#[test]
 fn a_late_force_has_its_own_name() {
     let found = report(&late(log("set-002"), force, 2));
     assert_eq!(found.effects.first().map(|effect| effect.name), Some("force_delay"), "{}", found.summary);

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
-use diagnose_benchmark::judge::{Judged, judge};
+use diagnose_benchmark::judge::{Judged, judge, judge_withheld};
 use diagnose_benchmark::learn::{Example, learn, leave_one_engine_out, read};
 use discrepancy::decision::{Decision, Probabilities};
 use program::Failed;
@@ -47,6 +47,8 @@ struct Table {
     provenance: serde_json::Value,
     /// Engine and what is counted of its logs.
     engines: Vec<(String, Judged)>,
+    /// Logs whose effect was withheld from what was compared: how many, called `unknown`, called by a name, by one with a confidence of 0.9 and more.
+    withheld: [u32; 4],
 }
 
 fn main() -> ExitCode {
@@ -69,16 +71,19 @@ fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     let provenance = provenance(arguments, &examples);
+    let withheld = examples.iter().filter_map(Example::without_truth);
+    let all: Vec<Example> = examples.iter().cloned().chain(withheld).collect();
     let judged = match &arguments.unseen {
-        Some(path) => unseen(path, &examples)?,
-        None => leave_one_engine_out(&examples),
+        Some(path) => unseen(path, &all)?,
+        None => leave_one_engine_out(&examples, &all),
     };
+    let (withheld, judged): (Vec<_>, Vec<_>) = judged.into_iter().partition(|(example, _)| example.withheld);
     let of = |engine: &str| -> Vec<(&Example, Probabilities)> {
         judged.iter().filter(|(example, _)| engine.is_empty() || example.truth.engine == engine).cloned().collect()
     };
     let mut rows: Vec<(String, Judged)> = engines.iter().map(|engine| (engine.clone(), judge(&of(engine)))).collect();
     rows.push(("all".into(), judge(&of(""))));
-    let table = Table { provenance: provenance.clone(), engines: rows };
+    let table = Table { provenance: provenance.clone(), engines: rows, withheld: judge_withheld(&withheld) };
     let text = markdown(&table);
     program::out!("{text}");
     if let Some(folder) = &arguments.table {
@@ -177,6 +182,11 @@ fn markdown(table: &Table) -> String {
         let _ =
             writeln!(text, "| {mean:.2} | {count} | {} |", share((right * f64::from(*count)).round() as u32, *count));
     }
+    let [logs, unknown, named, sure] = table.withheld;
+    let _ = writeln!(
+        text,
+        "\nOf {logs} logs whose effect was withheld from what was compared {unknown} are called `unknown`, {named} get another name, {sure} with a confidence of 0.9 or more."
+    );
     let _ =
         writeln!(text, "\nOf {} logs with 11 episodes or fewer {} got a wrong and sure name.", all.few[0], all.few[1]);
     text

@@ -1,7 +1,7 @@
 //! Fits to the episodes of the screening: what is compared before anything is fitted to all.
 
 use crate::accept::NEGLIGIBLE;
-use crate::begin::{are_twins, begin, follow, promise_friction, shake};
+use crate::begin::{are_twins, begin, follow, promise_in_place, shake};
 use crate::candidate::Candidate;
 use crate::fit::{Begin, Effort, Fit, fit};
 use crate::rival::{first_of_each, of_first};
@@ -94,7 +94,7 @@ impl Search<'_> {
     fn begun(&self, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<(Promise, Option<Begin>)> {
         let first = base.model.parts.is_empty();
         let (promises, looked, kept) = if first {
-            (promise_friction(part, base, promises), self.settings.looks, self.settings.quick_fits)
+            (promise_in_place(part, base, promises), self.settings.looks, self.settings.quick_fits)
         } else {
             (promises.to_vec(), self.settings.begins, self.settings.fits)
         };
