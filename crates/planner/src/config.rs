@@ -5,7 +5,7 @@ use crate::Error;
 /// Settings of [`crate::Pomcp`] and [`crate::Pomcpow`].
 ///
 /// Start from [`Config::default`] and change what your problem needs. [`crate::Planner::new`] checks every value. With the feature `serde` a
-/// file of settings has to name every key but `backup`: a missing key is an error and does not fall back to the default.
+/// file of settings has to name every key but `backup`, `choice` and `branch_states`: a missing key is an error and does not fall back to the default.
 ///
 /// # Defaults
 ///
@@ -18,6 +18,8 @@ use crate::Error;
 /// | `action_priors` | `Full` | What your policy knows is used. A policy that says nothing changes nothing. |
 /// | `observations` | `Classes` | One branch per class, as in POMCP. [`Config::with_widening`] is for continuous observations. |
 /// | `backup` | `Mean` | As published, and the better one where rollouts are informative. |
+/// | `choice` | `HighestMean` | As published for POMCP. `MostVisits` is safer where returns are noisy. |
+/// | `branch_states` | 0 | As published for POMCPOW. Some make rollouts believable where a policy knows what to do with a belief. |
 /// | `nodes` | 1,000,000 | About 16 MB per action of the model. More than a budget of some thousand simulations ever fills. |
 /// | `trees` | 1 | One tree learns most from a given budget; more trees pay where they run on threads of their own. |
 /// | `threads` | 1 | The caller decides how many cores are its own. |
@@ -61,6 +63,14 @@ pub struct Config {
     /// What an action learns from a simulation that explores below it. A file without this key means the mean.
     #[cfg_attr(feature = "serde", serde(default))]
     pub backup: Backup,
+    /// Which action is executed. A file without this key means the one with the highest mean.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
+    pub choice: Choice,
+    /// States that a new branch of progressive widening starts with: so many are drawn at its parent, stepped, and weighted by
+    /// the branch's observation. Rollouts then ask [`pomdp::Policy::belief_action`], with these states as a particle filter. At 0, which a file
+    /// without this key means, a branch starts with the state of its simulation, and rollouts see the state.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
+    pub branch_states: usize,
     /// Most nodes of all trees together, at least one per tree. States stored by progressive widening count as nodes.
     /// When the nodes are used up, the tree stops growing: simulations that leave it continue as rollouts, and
     /// [`crate::SearchReport::unexpanded`] counts them. Pruning frees nodes.
@@ -165,6 +175,24 @@ pub enum Backup {
     Watkins,
 }
 
+/// Which action of the root is executed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Choice {
+    /// The one with the highest mean return; among equals the one with more visits.
+    #[default]
+    HighestMean,
+    /// The one with the most visits; among equals the one with the higher mean. A mean over few visits is often high by chance.
+    MostVisits,
+}
+
+#[cfg(feature = "serde")]
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 impl Default for Config {
     /// The values of the table above.
     fn default() -> Self {
@@ -176,6 +204,8 @@ impl Default for Config {
             action_priors: ActionPriors::Full,
             observations: Observations::Classes,
             backup: Backup::Mean,
+            choice: Choice::HighestMean,
+            branch_states: 0,
             nodes: 1_000_000,
             trees: 1,
             threads: 1,
@@ -226,6 +256,18 @@ impl Config {
     #[must_use]
     pub fn with_backup(self, backup: Backup) -> Self {
         Self { backup, ..self }
+    }
+
+    /// Which action is executed.
+    #[must_use]
+    pub fn with_choice(self, choice: Choice) -> Self {
+        Self { choice, ..self }
+    }
+
+    /// States that a new branch of progressive widening starts with.
+    #[must_use]
+    pub fn with_branch_states(self, branch_states: usize) -> Self {
+        Self { branch_states, ..self }
     }
 
     /// Most nodes of all trees together. At least one a tree.

@@ -93,8 +93,7 @@ fn config(simulations: usize, depth: usize, factor: f64, exponent: f64) -> Confi
         observations: Observations::Widening { factor, exponent },
         backup: Backup::Mean,
         nodes: 1 << 24,
-        trees: 1,
-        threads: 1,
+        ..Config::default()
     }
 }
 

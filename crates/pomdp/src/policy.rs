@@ -38,6 +38,27 @@ pub trait Policy<M: GenerativeModel> {
     fn leaf_value(&self, _model: &M, _state: &M::State, _actions_left: usize) -> f64 {
         0.0
     }
+
+    /// Action of an agent that does not see the state. `belief` holds at least one state, each with a positive weight.
+    /// By default [`Self::action`] in a state drawn by weight.
+    fn belief_action(&self, model: &M, belief: &[(M::State, f64)], rng: &mut Rng) -> M::Action {
+        use rand::RngExt as _;
+        let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
+        let mut mark = rng.random::<f64>() * total;
+        let drawn = belief.iter().find(|(_, weight)| {
+            mark -= weight;
+            mark < 0.0
+        });
+        // Rounding may leave the mark on the total: then it is the last state.
+        let (state, _) = drawn.or(belief.last()).expect("a belief holds at least one state");
+        self.action(model, state, rng)
+    }
+
+    /// As [`Self::leaf_value`], for an agent that does not see the state. By default the mean of that value.
+    fn belief_value(&self, model: &M, belief: &[(M::State, f64)], actions_left: usize) -> f64 {
+        let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
+        belief.iter().map(|(state, weight)| weight / total * self.leaf_value(model, state, actions_left)).sum()
+    }
 }
 
 /// Uniform choice over all actions.

@@ -216,6 +216,18 @@ impl<M: Finite> Policy<M> for FullInformation {
     fn leaf_value(&self, model: &M, state: &M::State, _actions_left: usize) -> f64 {
         self.value(model, state)
     }
+
+    /// QMDP.
+    fn belief_action(&self, model: &M, belief: &[(M::State, f64)], _rng: &mut Rng) -> M::Action {
+        best(model, |action| belief.iter().map(|(s, p)| p * self.action_value(model, s, action)).sum())
+    }
+
+    /// The value of QMDP: that of one more action for a belief, after which the state is known.
+    fn belief_value(&self, model: &M, belief: &[(M::State, f64)], _actions_left: usize) -> f64 {
+        let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
+        let value = |action| belief.iter().map(|(s, p)| p * self.action_value(model, s, action)).sum::<f64>();
+        model.actions().iter().map(value).fold(f64::NEG_INFINITY, f64::max) / total
+    }
 }
 
 #[cfg(test)]

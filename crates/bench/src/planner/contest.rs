@@ -96,11 +96,17 @@ impl Problem {
             }
             Self::LaserTag => Options::widening(5000, 26.0, 90, 4.0, 1.0 / 35.0),
             Self::VdpTag => {
-                let mut options = Options::widening(1000, 110.0, 10, 5.0, 0.01);
+                let mut options = Options::widening(500, 110.0, 10, 5.0, 0.01);
                 options.planner.rollout_depth = RolloutDepth::Full;
+                options.planner.branch_states = 15;
                 Options { leaf: Leaf::Heuristic, particles: 10_000, directions: 12, aims: 3, ..options }
             }
-            Self::SubHunt => Options::widening(5000, 17.0, 20, 6.0, 0.01),
+            Self::SubHunt => {
+                let mut options = Options::widening(300, 30.0, 60, 6.0, 0.01);
+                options.planner.rollout_depth = RolloutDepth::Full;
+                options.planner.branch_states = 30;
+                options
+            }
         }
     }
 
