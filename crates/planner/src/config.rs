@@ -1,6 +1,6 @@
 //! Settings of a search.
 
-use crate::Error;
+use crate::{Choice, Error};
 
 /// Settings of [`crate::Pomcp`] and [`crate::Pomcpow`].
 ///
@@ -173,19 +173,6 @@ pub enum Backup {
     /// and Stone ("On the analysis of complex backup strategies in Monte Carlo tree search", ICML 2016) compare such
     /// backups. Use it where one wrong action costs much more than good actions differ by.
     Watkins,
-}
-
-/// Which action of the root is executed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Choice {
-    /// The one with the highest mean return; among equals the one with more visits.
-    #[default]
-    HighestMean,
-    /// The one with the most visits; among equals the one with the higher mean. A mean over few visits is often high by chance.
-    MostVisits,
 }
 
 #[cfg(feature = "serde")]
@@ -380,6 +367,7 @@ mod tests {
             nodes: 1_000_000,
             trees: 1,
             threads: 1,
+            ..Config::default()
         };
         assert_eq!(config(), expected);
         let other = TEXT
@@ -403,7 +391,13 @@ mod tests {
 
     #[test]
     fn a_config_survives_writing_and_reading() {
-        assert_eq!(toml::from_str::<Config>(&toml::to_string(&config()).unwrap()).unwrap(), config());
+        let other = Config { choice: Choice::MostVisits, branch_states: 7, ..config() };
+        for config in [config(), other] {
+            assert_eq!(toml::from_str::<Config>(&toml::to_string(&config).unwrap()).unwrap(), config);
+        }
+        // What has its default is not written: files that were written before these keys came stay as they are.
+        let text = toml::to_string(&config()).unwrap();
+        assert!(!text.contains("choice") && !text.contains("branch_states"), "{text}");
     }
 
     #[test]
@@ -482,6 +476,8 @@ mod tests {
         assert_eq!(d().with_action_priors(action_priors), Config { action_priors, ..d() });
         assert_eq!(d().with_widening(4.0, 0.2), Config { observations, ..d() });
         assert_eq!(d().with_backup(Backup::Watkins), Config { backup: Backup::Watkins, ..d() });
+        assert_eq!(d().with_choice(Choice::MostVisits), Config { choice: Choice::MostVisits, ..d() });
+        assert_eq!(d().with_branch_states(9), Config { branch_states: 9, ..d() });
         assert_eq!(d().with_nodes(50), Config { nodes: 50, ..d() });
         assert_eq!(d().with_trees(4, 2), Config { trees: 4, threads: 2, ..d() });
     }

@@ -80,8 +80,8 @@ mod tree;
 mod ucb;
 mod widening;
 
-pub use config::{ActionPriors, Backup, Budget, Choice, Config, Exploration, Observations, RolloutDepth};
+pub use config::{ActionPriors, Backup, Budget, Config, Exploration, Observations, RolloutDepth};
 pub use error::Error;
 pub use export::{ExportLimit, TreeAction, TreeBranch, TreeNode};
 pub use pomcp::{Planner, Pomcp, Pomcpow, SearchReport, Stop};
-pub use ucb::ActionStats;
+pub use ucb::{ActionStats, Choice};

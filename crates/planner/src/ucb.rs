@@ -3,8 +3,21 @@
 use pomdp::Rng;
 use rand::RngExt as _;
 
+use crate::Exploration;
 use crate::nodes::Slot;
-use crate::{Choice, Exploration};
+
+/// Which action of the root is executed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Choice {
+    /// The one with the highest mean return; among equals the one with more visits.
+    #[default]
+    HighestMean,
+    /// The one with the most visits; among equals the one with the higher mean. A mean over few visits is often high by chance.
+    MostVisits,
+}
 
 /// What is known of one action at one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -213,6 +226,9 @@ mod tests {
             "an unvisited action has no mean"
         );
         assert_eq!(best(&stats(&[(0, 0.0)]), Choice::HighestMean), None);
+        let by_visits = |pairs: &[(u32, f64)]| best(&stats(pairs), Choice::MostVisits);
+        assert_eq!(by_visits(&[(9, 1.0), (1, 2.0), (0, 0.0)]), Some(0));
+        assert_eq!(by_visits(&[(9, 1.0), (9, 2.0), (9, 2.0), (0, 0.0)]), Some(1));
     }
 
     #[test]

@@ -306,6 +306,35 @@ mod tests {
     }
 
     #[test]
+    fn a_branch_starts_with_states_of_its_parent_weighted_by_its_observation() {
+        let mut tree = WeightedTree::new(1, 1 << 20, 1.0, 0.0, 500);
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        let mut next = 0;
+        Branching::<Numbers>::begin(&mut tree, || {
+            next += 1;
+            next % 1000
+        });
+        let mut follow = |node, mut state: u32| {
+            let mut step = Numbers.step(&mut state, &(), &mut rng);
+            tree.follow(&Numbers, node, 0, &mut state, &mut step, &mut rng)
+        };
+        let Next::New(first) = follow(NodeId::ROOT, 3) else { panic!("the first step adds a branch") };
+        let Next::New(second) = follow(first, 4) else { panic!("so does the first below it") };
+        // Shares that the observation fits: 2/3 after one, and 4/5 after another like it. Tolerance 4 binomial standard deviations of 500; the second
+        // belief inherits the error of the first, and its observation may differ from the first one: then it is 1/2 of either kind.
+        let share = |node: NodeId, even: bool| {
+            let belief = tree.belief(node);
+            let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
+            belief.iter().filter(|(s, _)| s.is_multiple_of(2) == even).map(|(_, weight)| weight).sum::<f64>() / total
+        };
+        let seen = |node: NodeId| tree.branches[node.index() - 1].observation;
+        assert!((share(first, seen(first)) - 2.0 / 3.0).abs() < 0.09);
+        let expected = if seen(first) == seen(second) { 0.8 } else { 0.5 };
+        assert!((share(second, seen(second)) - expected).abs() < 0.16);
+        assert_eq!((tree.belief(first).len(), tree.held), (501, 1002));
+    }
+
+    #[test]
     fn states_of_weight_zero_are_never_drawn() {
         let mut branch =
             Branch { observation: (), passed: 1, log_reference: 0.0, held: Vec::new(), next: NodeId::NONE };

@@ -72,3 +72,58 @@ impl<M: GenerativeModel> Policy<M> for UniformPolicy {
         actions[rng.random_range(0..actions.len())].clone()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Outcome, Purpose, Seed, Step};
+
+    /// Does what its state says.
+    struct Named;
+
+    impl GenerativeModel for Named {
+        type State = u8;
+        type Action = u8;
+        type Observation = ();
+
+        fn actions(&self) -> &[u8] {
+            &[0, 1, 2]
+        }
+
+        fn step(&self, _state: &mut u8, _action: &u8, _rng: &mut Rng) -> Step<()> {
+            Step { observation: (), reward: 0.0, outcome: Outcome::Terminal }
+        }
+
+        fn discount(&self) -> f64 {
+            1.0
+        }
+    }
+
+    struct Obeys;
+
+    impl Policy<Named> for Obeys {
+        fn action(&self, _model: &Named, state: &u8, _rng: &mut Rng) -> u8 {
+            *state
+        }
+
+        fn leaf_value(&self, _model: &Named, state: &u8, actions_left: usize) -> f64 {
+            f64::from(*state) * actions_left as f64
+        }
+    }
+
+    #[test]
+    fn without_knowledge_of_beliefs_a_policy_acts_in_a_state_drawn_by_weight() {
+        let belief = [(0, 1.0), (1, 2.0), (2, 5.0)];
+        assert!((Obeys.belief_value(&Named, &belief, 4) - 4.0 * (2.0 + 10.0) / 8.0).abs() < 1e-12);
+        // Null: shares 1/8, 2/8 and 5/8. n = 8000; tolerance 4 binomial standard deviations.
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        let mut counts = [0.0; 3];
+        for _ in 0..8000 {
+            counts[usize::from(Obeys.belief_action(&Named, &belief, &mut rng))] += 1.0;
+        }
+        for (count, share) in counts.into_iter().zip([0.125, 0.25, 0.625]) {
+            let deviation: f64 = count - 8000.0 * share;
+            assert!(deviation.abs() < 4.0 * (8000.0 * share * (1.0_f64 - share)).sqrt(), "{counts:?}");
+        }
+    }
+}

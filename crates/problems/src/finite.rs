@@ -353,6 +353,22 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_belief_is_worth_one_action_before_the_state_is_known() {
+        // max_a Σ b(s) Q(s, a), which is at most Σ b(s) max_a Q(s, a).
+        let known = FullInformation::solve(&Rooms, 1e-12);
+        let belief = [(false, 3.0), (true, 1.0)];
+        let mean = |action: bool| {
+            0.75 * known.action_value(&Rooms, &false, &action) + 0.25 * known.action_value(&Rooms, &true, &action)
+        };
+        let value = known.belief_value(&Rooms, &belief, 9);
+        assert!((value - mean(false).max(mean(true))).abs() < 1e-12);
+        assert!(value <= 0.75 * known.value(&Rooms, &false) + 0.25 * known.value(&Rooms, &true) + 1e-12);
+        let exact = ExactBelief::of(vec![(false, 0.75), (true, 0.25)]);
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        assert_eq!(known.belief_action(&Rooms, &belief, &mut rng), known.qmdp(&Rooms, &exact));
+    }
+
+    #[test]
     fn what_no_state_explains_has_no_belief() {
         // In the third step of the chain the observation has probability zero everywhere.
         let only = ExactBelief::of(vec![(true, 1.0)]);

@@ -88,13 +88,12 @@ impl Problem {
                 options
             }
             Self::RockSample => {
-                let mut options = Options::widening(2048, 20.0, 90, 1.0, 0.0);
+                let mut options = Options::widening(2048, 1.0, 90, 1.0, 0.0);
                 options.planner.observations = Observations::Classes;
-                options.planner.action_priors = ActionPriors::Full;
-                options.planner.rollout_depth = RolloutDepth::Full;
-                Options { leaf: Leaf::Heuristic, horizon: 90, particles: 2048, ..options }
+                options.planner.action_priors = ActionPriors::Legal;
+                Options { leaf: Leaf::Plan, horizon: 90, particles: 2048, ..options }
             }
-            Self::LaserTag => Options::widening(5000, 26.0, 90, 4.0, 1.0 / 35.0),
+            Self::LaserTag => Options::widening(50_000, 26.0, 90, 4.0, 1.0 / 35.0),
             Self::VdpTag => {
                 let mut options = Options::widening(500, 110.0, 10, 5.0, 0.01);
                 options.planner.rollout_depth = RolloutDepth::Full;

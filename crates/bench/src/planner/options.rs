@@ -94,6 +94,8 @@ mod tests {
             options.with("planner.exploration", "{ fixed = 30.0 }").unwrap().with("leaf", "\"random\"").unwrap();
         assert_eq!(changed.planner.exploration, Exploration::Fixed(30.0));
         assert_eq!((changed.leaf, changed.planner.depth), (Leaf::Random, 20));
+        let states = options.with("planner.branch_states", "5").unwrap().planner.branch_states;
+        assert_eq!(states, 5, "an option that is not written at its default can be set");
         let unknown = options.with("planner.deep", "3").unwrap_err().to_string();
         assert!(unknown.starts_with("there is no option planner.deep"), "{unknown}");
         assert_eq!(options.with("particles", "-3").unwrap_err().to_string(), "particles cannot be -3");
