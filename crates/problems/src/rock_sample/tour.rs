@@ -19,6 +19,9 @@ const POWERS: [f64; 64] = {
     powers
 };
 
+/// Simulations that the value of a plan stands for.
+const VISITS: u32 = 30;
+
 /// A rock that may be visited.
 #[derive(Clone, Copy, Debug, Default)]
 struct Stop {
@@ -211,9 +214,14 @@ impl Policy<RockSample> for Tour {
         model.plan(state).first
     }
 
-    /// What POMCP 1.0 calls legal, without preferences.
+    /// What POMCP 1.0 calls legal. Some visits say what the plan is worth, and that any other action costs at least a step: a plan has no noise, and returns
+    /// of single simulations have much.
     fn priors(&self, model: &RockSample, state: &State, priors: &mut [ActionPrior]) {
         model.legal(state).restrict(priors);
+        let Plan { first, value } = model.plan(state);
+        for (action, prior) in model.actions.iter().zip(priors) {
+            (prior.visits, prior.value) = (VISITS, if *action == first { value } else { DISCOUNT * value });
+        }
     }
 
     fn leaf_value(&self, model: &RockSample, state: &State, _actions_left: usize) -> f64 {
