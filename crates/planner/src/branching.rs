@@ -1,8 +1,9 @@
 //! What a search needs of a tree, for both kinds of branching.
 
-use pomdp::{GenerativeModel, Rng, Step};
+use pomdp::{GenerativeModel, Policy, Rng, Step};
 
 use crate::nodes::{NodeId, Nodes};
+use crate::rollout::{Rollout, Span, rollout};
 use crate::{Config, Error};
 
 /// Where a simulation goes after a step.
@@ -44,6 +45,22 @@ pub trait Branching<M: GenerativeModel>: Send + Sized {
         step: &mut Step<M::Observation>,
         rng: &mut Rng,
     ) -> Next;
+
+    /// A search begins; `draw` draws from its belief.
+    fn begin(&mut self, _draw: impl FnMut() -> M::State) {}
+
+    /// The tail of a simulation in `state` that left the tree by the new node `leaf`, or because there was no place for one.
+    fn rollout<P: Policy<M> + ?Sized>(
+        &self,
+        model: &M,
+        policy: &P,
+        state: &mut M::State,
+        _leaf: Option<NodeId>,
+        span: Span,
+        rng: &mut Rng,
+    ) -> Rollout {
+        rollout(model, policy, state, span, rng)
+    }
 }
 
 /// What an export needs of a tree.

@@ -1,11 +1,11 @@
 //! Settings of a search.
 
-use crate::Error;
+use crate::{Choice, Error};
 
 /// Settings of [`crate::Pomcp`] and [`crate::Pomcpow`].
 ///
 /// Start from [`Config::default`] and change what your problem needs. [`crate::Planner::new`] checks every value. With the feature `serde` a
-/// file of settings has to name every key but `backup`: a missing key is an error and does not fall back to the default.
+/// file of settings has to name every key but `backup`, `choice` and `branch_states`: a missing key is an error and does not fall back to the default.
 ///
 /// # Defaults
 ///
@@ -18,6 +18,8 @@ use crate::Error;
 /// | `action_priors` | `Full` | What your policy knows is used. A policy that says nothing changes nothing. |
 /// | `observations` | `Classes` | One branch per class, as in POMCP. [`Config::with_widening`] is for continuous observations. |
 /// | `backup` | `Mean` | As published, and the better one where rollouts are informative. |
+/// | `choice` | `HighestMean` | As published for POMCP. `MostVisits` is safer where returns are noisy. |
+/// | `branch_states` | 0 | As published for POMCPOW. Some make rollouts believable where a policy knows what to do with a belief. |
 /// | `nodes` | 1,000,000 | About 16 MB per action of the model. More than a budget of some thousand simulations ever fills. |
 /// | `trees` | 1 | One tree learns most from a given budget; more trees pay where they run on threads of their own. |
 /// | `threads` | 1 | The caller decides how many cores are its own. |
@@ -61,6 +63,14 @@ pub struct Config {
     /// What an action learns from a simulation that explores below it. A file without this key means the mean.
     #[cfg_attr(feature = "serde", serde(default))]
     pub backup: Backup,
+    /// Which action is executed. A file without this key means the one with the highest mean.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
+    pub choice: Choice,
+    /// States that a new branch of progressive widening starts with: so many are drawn at its parent, stepped, and weighted by
+    /// the branch's observation. Rollouts then ask [`pomdp::Policy::belief_action`], with these states as a particle filter. At 0, which a file
+    /// without this key means, a branch starts with the state of its simulation, and rollouts see the state.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
+    pub branch_states: usize,
     /// Most nodes of all trees together, at least one per tree. States stored by progressive widening count as nodes.
     /// When the nodes are used up, the tree stops growing: simulations that leave it continue as rollouts, and
     /// [`crate::SearchReport::unexpanded`] counts them. Pruning frees nodes.
@@ -165,6 +175,11 @@ pub enum Backup {
     Watkins,
 }
 
+#[cfg(feature = "serde")]
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 impl Default for Config {
     /// The values of the table above.
     fn default() -> Self {
@@ -176,6 +191,8 @@ impl Default for Config {
             action_priors: ActionPriors::Full,
             observations: Observations::Classes,
             backup: Backup::Mean,
+            choice: Choice::HighestMean,
+            branch_states: 0,
             nodes: 1_000_000,
             trees: 1,
             threads: 1,
@@ -226,6 +243,18 @@ impl Config {
     #[must_use]
     pub fn with_backup(self, backup: Backup) -> Self {
         Self { backup, ..self }
+    }
+
+    /// Which action is executed.
+    #[must_use]
+    pub fn with_choice(self, choice: Choice) -> Self {
+        Self { choice, ..self }
+    }
+
+    /// States that a new branch of progressive widening starts with.
+    #[must_use]
+    pub fn with_branch_states(self, branch_states: usize) -> Self {
+        Self { branch_states, ..self }
     }
 
     /// Most nodes of all trees together. At least one a tree.
@@ -338,6 +367,7 @@ mod tests {
             nodes: 1_000_000,
             trees: 1,
             threads: 1,
+            ..Config::default()
         };
         assert_eq!(config(), expected);
         let other = TEXT
@@ -361,7 +391,13 @@ mod tests {
 
     #[test]
     fn a_config_survives_writing_and_reading() {
-        assert_eq!(toml::from_str::<Config>(&toml::to_string(&config()).unwrap()).unwrap(), config());
+        let other = Config { choice: Choice::MostVisits, branch_states: 7, ..config() };
+        for config in [config(), other] {
+            assert_eq!(toml::from_str::<Config>(&toml::to_string(&config).unwrap()).unwrap(), config);
+        }
+        // What has its default is not written: files that were written before these keys came stay as they are.
+        let text = toml::to_string(&config()).unwrap();
+        assert!(!text.contains("choice") && !text.contains("branch_states"), "{text}");
     }
 
     #[test]
@@ -440,6 +476,8 @@ mod tests {
         assert_eq!(d().with_action_priors(action_priors), Config { action_priors, ..d() });
         assert_eq!(d().with_widening(4.0, 0.2), Config { observations, ..d() });
         assert_eq!(d().with_backup(Backup::Watkins), Config { backup: Backup::Watkins, ..d() });
+        assert_eq!(d().with_choice(Choice::MostVisits), Config { choice: Choice::MostVisits, ..d() });
+        assert_eq!(d().with_branch_states(9), Config { branch_states: 9, ..d() });
         assert_eq!(d().with_nodes(50), Config { nodes: 50, ..d() });
         assert_eq!(d().with_trees(4, 2), Config { trees: 4, threads: 2, ..d() });
     }

@@ -66,6 +66,7 @@
 //! | one branch too few by widening | `a_branch_per_visit_at_most_and_few_where_configured_so` |
 //! | reward of another state than the one drawn | `widening::a_simulation_goes_on_from_a_weighted_state_with_the_reward_that_led_to_it` |
 
+mod believing;
 mod branching;
 mod config;
 mod error;
@@ -83,4 +84,4 @@ pub use config::{ActionPriors, Backup, Budget, Config, Exploration, Observations
 pub use error::Error;
 pub use export::{ExportLimit, TreeAction, TreeBranch, TreeNode};
 pub use pomcp::{Planner, Pomcp, Pomcpow, SearchReport, Stop};
-pub use ucb::ActionStats;
+pub use ucb::{ActionStats, Choice};

@@ -62,7 +62,7 @@ pub enum Stop {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SearchReport<A> {
-    /// Action with the highest mean return; among equals the one with more visits, then the first.
+    /// Action that [`crate::Choice`] names; among equals the first.
     pub action: A,
     /// Statistics of the root's actions in the model's order, including kept subtrees and initial visits. With several
     /// trees a value is the mean of all their returns.
@@ -145,7 +145,7 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
                 merged.merge(slot.stats());
             }
         }
-        let best = ucb::best(&stats).expect("a valid budget affords at least one simulation");
+        let best = ucb::best(&stats, config.choice).expect("a valid budget affords at least one simulation");
         let sum = |count: fn(&crate::simulate::Tally) -> usize| tallies.iter().map(count).sum();
         let report = SearchReport {
             action: self.actions[best].clone(),

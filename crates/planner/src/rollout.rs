@@ -4,7 +4,7 @@ use pomdp::{GenerativeModel, Outcome, Policy, Rng};
 
 /// What a rollout brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rollout {
+pub struct Rollout {
     /// Σ γ^t r_t from the first action of the rollout on, what the policy expects beyond its cut included.
     pub(crate) discounted_return: f64,
     pub(crate) transitions: usize,
@@ -12,19 +12,22 @@ pub(crate) struct Rollout {
     pub(crate) outcome: Outcome,
 }
 
-/// Follows `policy` in place from `state` for at most `actions` of the `left` actions until the horizon.
-pub(crate) fn rollout<M, P>(
-    model: &M,
-    policy: &P,
-    state: &mut M::State,
-    actions: usize,
-    left: usize,
-    rng: &mut Rng,
-) -> Rollout
+/// How far a rollout goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// Actions until it is cut.
+    pub(crate) actions: usize,
+    /// Actions until the horizon.
+    pub(crate) left: usize,
+}
+
+/// Follows `policy` in place from `state`.
+pub(crate) fn rollout<M, P>(model: &M, policy: &P, state: &mut M::State, span: Span, rng: &mut Rng) -> Rollout
 where
     M: GenerativeModel,
     P: Policy<M> + ?Sized,
 {
+    let Span { actions, left } = span;
     let mut result = Rollout { discounted_return: 0.0, transitions: 0, outcome: Outcome::Continue };
     let (mut weight, discount) = (1.0, model.discount());
     while result.transitions < actions && result.outcome == Outcome::Continue {
@@ -85,7 +88,7 @@ mod tests {
 
     fn run(ending: Outcome, mut count: usize, actions: usize, left: usize) -> Rollout {
         let mut rng = Seed(1).stream(Purpose::Test, 0);
-        rollout(&Countdown(ending), &UniformPolicy, &mut count, actions, left, &mut rng)
+        rollout(&Countdown(ending), &UniformPolicy, &mut count, Span { actions, left }, &mut rng)
     }
 
     #[test]
@@ -108,7 +111,7 @@ mod tests {
         let run = |mut count, actions, left| {
             let mut rng = Seed(1).stream(Purpose::Test, 0);
             let model = Countdown(Outcome::Terminal);
-            rollout(&model, &Expects, &mut count, actions, left, &mut rng).discounted_return
+            rollout(&model, &Expects, &mut count, Span { actions, left }, &mut rng).discounted_return
         };
         // 1 + 1/2, then (9 − 2) / 2 discounted twice.
         assert_eq!(run(100, 2, 9), 1.5 + 0.25 * 3.5);

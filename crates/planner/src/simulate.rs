@@ -7,7 +7,7 @@ use pomdp::{ActionPrior, Belief, GenerativeModel, Outcome, Policy, Rng};
 use crate::branching::{Branching, Next};
 use crate::config::share;
 use crate::nodes::NodeId;
-use crate::rollout::rollout;
+use crate::rollout::Span;
 use crate::ucb::{self, ReturnRange};
 use crate::{ActionPriors, Backup, Budget, Config};
 
@@ -106,6 +106,7 @@ where
         B: Belief<State = M::State> + ?Sized,
     {
         let mut returns = ReturnRange::of_means(self.tree.nodes().slots(NodeId::ROOT));
+        self.tree.begin(|| belief.sample(rng).clone());
         while share.affords(&self.tally, self.depth) {
             self.tally.exploration = self.config.exploration.constant(returns);
             let state = belief.sample(rng).clone();
@@ -135,14 +136,14 @@ where
             match next {
                 Next::Known(child) => node = child,
                 Next::New(_) | Next::Full => {
-                    if let Next::New(child) = next {
-                        self.set_priors(child, &state);
-                    } else {
-                        self.tally.unexpanded += 1;
+                    let leaf = if let Next::New(child) = next { Some(child) } else { None };
+                    match leaf {
+                        Some(child) => self.set_priors(child, &state),
+                        None => self.tally.unexpanded += 1,
                     }
                     let left = self.depth - self.path.len();
-                    let actions = self.config.rollout_depth.actions(left);
-                    let below = rollout(self.model, self.policy, &mut state, actions, left, rng);
+                    let span = Span { actions: self.config.rollout_depth.actions(left), left };
+                    let below = self.tree.rollout(self.model, self.policy, &mut state, leaf, span, rng);
                     self.tally.end(below.outcome);
                     self.tally.transitions += below.transitions;
                     tail = below.discounted_return;

@@ -113,6 +113,11 @@ where
 {
     fn check(config: &Config) -> Result<(), Error> {
         match config.observations {
+            Observations::Classes if config.branch_states > 0 => Err(Error::Config {
+                key: "branch_states",
+                value: config.branch_states.to_string(),
+                limit: "0 for `Pomcp`; `Pomcpow` holds states in its branches".into(),
+            }),
             Observations::Classes => Ok(()),
             Observations::Widening { .. } => Err(Error::Config {
                 key: "observations",

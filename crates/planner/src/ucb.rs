@@ -6,6 +6,19 @@ use rand::RngExt as _;
 use crate::Exploration;
 use crate::nodes::Slot;
 
+/// Which action of the root is executed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Choice {
+    /// The one with the highest mean return; among equals the one with more visits.
+    #[default]
+    HighestMean,
+    /// The one with the most visits; among equals the one with the higher mean. A mean over few visits is often high by chance.
+    MostVisits,
+}
+
 /// What is known of one action at one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -102,11 +115,18 @@ pub(crate) fn unless_exploring(slots: &[Slot], action: usize, discounted_return:
     if slots[action].value < best { best } else { discounted_return }
 }
 
-/// Index of the action to execute: highest mean return, then more visits, then the lowest index. Unvisited actions are out.
-pub(crate) fn best(stats: &[ActionStats]) -> Option<usize> {
+/// Index of the action to execute: highest mean return, then more visits, then the lowest index; or visits first. Unvisited actions are
+/// out.
+pub(crate) fn best(stats: &[ActionStats], choice: Choice) -> Option<usize> {
     let visited = stats.iter().enumerate().filter(|(_, s)| s.visits > 0);
     // `max_by` returns the last of equal elements; reversing makes that the lowest index.
-    let best = visited.rev().max_by(|(_, a), (_, b)| a.value.total_cmp(&b.value).then(a.visits.cmp(&b.visits)));
+    let best = visited.rev().max_by(|(_, a), (_, b)| {
+        let (means, visits) = (a.value.total_cmp(&b.value), a.visits.cmp(&b.visits));
+        match choice {
+            Choice::HighestMean => means.then(visits),
+            Choice::MostVisits => visits.then(means),
+        }
+    });
     best.map(|(index, _)| index)
 }
 
@@ -181,7 +201,7 @@ mod tests {
         assert_eq!(select(&slots, 1.105, &mut rng()), 0);
         assert_eq!(select(&slots, 1.106, &mut rng()), 2);
         assert_eq!(slots[1].stats().visits, 0);
-        assert_eq!(best(&[slots[1].stats(), slots[0].stats()]), Some(1));
+        assert_eq!(best(&[slots[1].stats(), slots[0].stats()], Choice::HighestMean), Some(1));
     }
 
     #[test]
@@ -197,11 +217,18 @@ mod tests {
 
     #[test]
     fn the_final_action_has_the_highest_mean_then_more_visits_then_the_lowest_index() {
-        assert_eq!(best(&stats(&[(9, 1.0), (1, 2.0), (0, 0.0)])), Some(1));
-        assert_eq!(best(&stats(&[(2, 1.0), (3, 1.0), (1, 1.0)])), Some(1));
-        assert_eq!(best(&stats(&[(2, 0.0), (3, 1.0), (3, 1.0)])), Some(1));
-        assert_eq!(best(&stats(&[(0, 0.0), (3, -1.0)])), Some(1), "an unvisited action has no mean");
-        assert_eq!(best(&stats(&[(0, 0.0)])), None);
+        assert_eq!(best(&stats(&[(9, 1.0), (1, 2.0), (0, 0.0)]), Choice::HighestMean), Some(1));
+        assert_eq!(best(&stats(&[(2, 1.0), (3, 1.0), (1, 1.0)]), Choice::HighestMean), Some(1));
+        assert_eq!(best(&stats(&[(2, 0.0), (3, 1.0), (3, 1.0)]), Choice::HighestMean), Some(1));
+        assert_eq!(
+            best(&stats(&[(0, 0.0), (3, -1.0)]), Choice::HighestMean),
+            Some(1),
+            "an unvisited action has no mean"
+        );
+        assert_eq!(best(&stats(&[(0, 0.0)]), Choice::HighestMean), None);
+        let by_visits = |pairs: &[(u32, f64)]| best(&stats(pairs), Choice::MostVisits);
+        assert_eq!(by_visits(&[(9, 1.0), (1, 2.0), (0, 0.0)]), Some(0));
+        assert_eq!(by_visits(&[(9, 1.0), (9, 2.0), (9, 2.0), (0, 0.0)]), Some(1));
     }
 
     #[test]

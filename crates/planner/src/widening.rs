@@ -5,11 +5,13 @@
 //! observation as weight, and the reward of the step that led to it. A simulation goes on from one drawn by weight, so
 //! that below a branch the belief is that of its observation, although no two simulations see the same one.
 
-use pomdp::{GenerativeModel, ObservationModel, Rng, Step};
+use pomdp::{GenerativeModel, ObservationModel, Outcome, Policy, Rng, Step};
 use rand::RngExt as _;
 
+use crate::believing;
 use crate::branching::{Branching, Export, Next};
 use crate::nodes::{NodeId, Nodes};
+use crate::rollout::{Rollout, Span, rollout};
 use crate::{Config, Error, Observations};
 
 /// A state in a branch.
@@ -67,11 +69,35 @@ pub struct WeightedTree<S, O> {
     held: usize,
     factor: f64,
     exponent: f64,
+    /// States that a new branch starts with, besides that of its simulation.
+    branch_states: usize,
+    /// Draws of the belief that is searched from: what branches at the root start from.
+    roots: Vec<S>,
 }
 
+/// Draws of the belief for each state of a branch at the root.
+const ROOTS_PER_BRANCH_STATE: usize = 16;
+
 impl<S: Clone, O> WeightedTree<S, O> {
-    fn new(actions: usize, limit: usize, factor: f64, exponent: f64) -> Self {
-        Self { nodes: Nodes::new(actions, limit), branches: Vec::new(), held: 0, factor, exponent }
+    fn new(actions: usize, limit: usize, factor: f64, exponent: f64, branch_states: usize) -> Self {
+        let (nodes, branches) = (Nodes::new(actions, limit), Vec::new());
+        Self { nodes, branches, held: 0, factor, exponent, branch_states, roots: Vec::new() }
+    }
+
+    /// A state drawn at a node.
+    fn draw_state(&self, node: NodeId, rng: &mut Rng) -> Option<&S> {
+        if node == NodeId::ROOT {
+            return (!self.roots.is_empty()).then(|| &self.roots[rng.random_range(0..self.roots.len())]);
+        }
+        self.branches[node.index() - 1].draw(rng).map(|held| &held.state)
+    }
+
+    /// States of a branch with their weights, where these are positive.
+    fn belief(&self, node: NodeId) -> Vec<(S, f64)> {
+        let held = &self.branches[node.index() - 1].held;
+        let mut before = 0.0;
+        let weighted = held.iter().map(|h| (h, h.cumulative - std::mem::replace(&mut before, h.cumulative)));
+        weighted.filter(|(_, weight)| *weight > 0.0).map(|(h, weight)| (h.state.clone(), weight)).collect()
     }
 
     /// Branches of an action, the newest first.
@@ -120,7 +146,7 @@ where
         let Observations::Widening { factor, exponent } = config.observations else {
             unreachable!("`check` lets only widening through")
         };
-        Self::new(actions, limit, factor, exponent)
+        Self::new(actions, limit, factor, exponent, config.branch_states)
     }
 
     fn nodes(&self) -> &Nodes {
@@ -147,7 +173,7 @@ where
         let named = &model.actions()[action];
         let slot = self.nodes.slot(node, action);
         // A new branch takes two places: a node and its first state.
-        let full = self.nodes.full(self.held + 1);
+        let full = self.nodes.full(self.held + 1 + self.branch_states);
         if !full && self.widens(slot.visits(), self.of(node, action).count()) {
             let log_likelihood = model.log_likelihood(named, state, &step.observation);
             let log_reference = if log_likelihood.is_finite() { log_likelihood } else { 0.0 };
@@ -160,8 +186,16 @@ where
                 next: slot.branch,
             };
             branch.add(state, step.reward, log_likelihood);
+            for _ in 0..self.branch_states {
+                let Some(start) = self.draw_state(node, rng) else { break };
+                let mut state = start.clone();
+                let step = model.step(&mut state, named, rng);
+                if step.outcome == Outcome::Continue {
+                    branch.add(&state, step.reward, model.log_likelihood(named, &state, &branch.observation));
+                }
+            }
+            self.held += branch.held.len();
             self.branches.push(branch);
-            self.held += 1;
             self.nodes.slot_mut(node, action).branch = new;
             return Next::New(new);
         }
@@ -177,6 +211,28 @@ where
             (*state, step.reward) = (held.state.clone(), held.reward);
         }
         Next::Known(child)
+    }
+
+    fn begin(&mut self, draw: impl FnMut() -> M::State) {
+        self.roots.clear();
+        self.roots.extend(std::iter::repeat_with(draw).take(ROOTS_PER_BRANCH_STATE * self.branch_states));
+    }
+
+    fn rollout<P: Policy<M> + ?Sized>(
+        &self,
+        model: &M,
+        policy: &P,
+        state: &mut M::State,
+        leaf: Option<NodeId>,
+        span: Span,
+        rng: &mut Rng,
+    ) -> Rollout {
+        match leaf {
+            Some(leaf) if self.branch_states > 0 => {
+                believing::rollout(model, policy, state, self.belief(leaf), span, rng)
+            }
+            _ => rollout(model, policy, state, span, rng),
+        }
     }
 }
 
@@ -197,7 +253,7 @@ pub(crate) type TreeOf<M> = WeightedTree<<M as GenerativeModel>::State, <M as Ge
 
 #[cfg(test)]
 mod tests {
-    use pomdp::{Outcome, Purpose, Seed};
+    use pomdp::{Purpose, Seed};
 
     use super::*;
 
@@ -231,7 +287,7 @@ mod tests {
 
     #[test]
     fn a_simulation_goes_on_from_a_weighted_state_with_the_reward_that_led_to_it() {
-        let mut tree = WeightedTree::new(1, 1 << 20, 1.0, 0.0);
+        let mut tree = WeightedTree::new(1, 1 << 20, 1.0, 0.0, 0);
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         let (mut agreed, mut known) = (0, 0);
         for _ in 0..20_000 {
@@ -247,6 +303,35 @@ mod tests {
         // Null: two of three. n about 20,000, standard deviation of the share 0.0033; tolerance 5 of them, for draws share states.
         let share = f64::from(agreed) / f64::from(known);
         assert!(known > 19_000 && (share - 2.0 / 3.0).abs() < 0.0167, "{share} of {known}");
+    }
+
+    #[test]
+    fn a_branch_starts_with_states_of_its_parent_weighted_by_its_observation() {
+        let mut tree = WeightedTree::new(1, 1 << 20, 1.0, 0.0, 500);
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        let mut next = 0;
+        Branching::<Numbers>::begin(&mut tree, || {
+            next += 1;
+            next % 1000
+        });
+        let mut follow = |node, mut state: u32| {
+            let mut step = Numbers.step(&mut state, &(), &mut rng);
+            tree.follow(&Numbers, node, 0, &mut state, &mut step, &mut rng)
+        };
+        let Next::New(first) = follow(NodeId::ROOT, 3) else { panic!("the first step adds a branch") };
+        let Next::New(second) = follow(first, 4) else { panic!("so does the first below it") };
+        // Shares that the observation fits: 2/3 after one, and 4/5 after another like it. Tolerance 4 binomial standard deviations of 500; the second
+        // belief inherits the error of the first, and its observation may differ from the first one: then it is 1/2 of either kind.
+        let share = |node: NodeId, even: bool| {
+            let belief = tree.belief(node);
+            let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
+            belief.iter().filter(|(s, _)| s.is_multiple_of(2) == even).map(|(_, weight)| weight).sum::<f64>() / total
+        };
+        let seen = |node: NodeId| tree.branches[node.index() - 1].observation;
+        assert!((share(first, seen(first)) - 2.0 / 3.0).abs() < 0.09);
+        let expected = if seen(first) == seen(second) { 0.8 } else { 0.5 };
+        assert!((share(second, seen(second)) - expected).abs() < 0.16);
+        assert_eq!((tree.belief(first).len(), tree.held), (501, 1002));
     }
 
     #[test]

@@ -23,8 +23,7 @@ where
         observations: Observations::Classes,
         backup: Backup::Mean,
         nodes: 1 << 22,
-        trees: 1,
-        threads: 1,
+        ..Config::default()
     };
     let advice = Advice::default();
     let play = |item| {

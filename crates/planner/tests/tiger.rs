@@ -22,8 +22,7 @@ fn config(factor: f64, simulations: usize, depth: usize) -> Config {
         observations: Observations::Classes,
         backup: Backup::Mean,
         nodes: 1 << 24,
-        trees: 1,
-        threads: 1,
+        ..Config::default()
     }
 }
 

@@ -216,6 +216,18 @@ impl<M: Finite> Policy<M> for FullInformation {
     fn leaf_value(&self, model: &M, state: &M::State, _actions_left: usize) -> f64 {
         self.value(model, state)
     }
+
+    /// QMDP.
+    fn belief_action(&self, model: &M, belief: &[(M::State, f64)], _rng: &mut Rng) -> M::Action {
+        best(model, |action| belief.iter().map(|(s, p)| p * self.action_value(model, s, action)).sum())
+    }
+
+    /// The value of QMDP: that of one more action for a belief, after which the state is known.
+    fn belief_value(&self, model: &M, belief: &[(M::State, f64)], _actions_left: usize) -> f64 {
+        let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
+        let value = |action| belief.iter().map(|(s, p)| p * self.action_value(model, s, action)).sum::<f64>();
+        model.actions().iter().map(value).fold(f64::NEG_INFINITY, f64::max) / total
+    }
 }
 
 #[cfg(test)]
@@ -338,6 +350,22 @@ pub(crate) mod tests {
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         let share = (0..4000).filter(|_| *after.sample(&mut rng)).count() as f64 / 4000.0;
         assert!((share - found[1].1).abs() < 4.0 * (found[1].1 * found[0].1 / 4000.0_f64).sqrt());
+    }
+
+    #[test]
+    fn a_belief_is_worth_one_action_before_the_state_is_known() {
+        // max_a Σ b(s) Q(s, a), which is at most Σ b(s) max_a Q(s, a).
+        let known = FullInformation::solve(&Rooms, 1e-12);
+        let belief = [(false, 3.0), (true, 1.0)];
+        let mean = |action: bool| {
+            0.75 * known.action_value(&Rooms, &false, &action) + 0.25 * known.action_value(&Rooms, &true, &action)
+        };
+        let value = known.belief_value(&Rooms, &belief, 9);
+        assert!((value - mean(false).max(mean(true))).abs() < 1e-12);
+        assert!(value <= 0.75 * known.value(&Rooms, &false) + 0.25 * known.value(&Rooms, &true) + 1e-12);
+        let exact = ExactBelief::of(vec![(false, 0.75), (true, 0.25)]);
+        let mut rng = Seed(1).stream(Purpose::Test, 0);
+        assert_eq!(known.belief_action(&Rooms, &belief, &mut rng), known.qmdp(&Rooms, &exact));
     }
 
     #[test]

@@ -18,6 +18,8 @@ pub const DISCOUNT: f64 = 0.95;
 /// Distance, in cells, at which what a check tells beyond chance has halved.
 const HALF_DISTANCE: f64 = 20.0;
 const MOST_ROCKS: usize = 16;
+/// Log-odds are kept as whole multiples of one part in this many.
+const LOG_ODDS_UNIT: f64 = 1000.0;
 /// First check among the actions.
 const CHECK: usize = 5;
 const SAMPLE: Actions = Actions(1 << 4);
@@ -73,6 +75,10 @@ struct Seen {
     disliked: u16,
     /// Rocks that were checked from their own cell, where a check is never wrong.
     certain: u16,
+    /// Rocks that looked good in their last check from their own cell.
+    proven: u16,
+    /// ln(p / (1 − p)) for the probability p that the rock is good, from checks from other cells, in thousandths.
+    log_odds: [i16; MOST_ROCKS],
     /// Rocks that need no further check: certain ones, and those with 5 checks or a balance of 2 either way.
     settled: u16,
 }
@@ -88,6 +94,11 @@ impl Seen {
         seen.disliked = if balance < 0 { seen.disliked | bit } else { seen.disliked & !bit };
         if accuracy == 1.0 {
             seen.certain |= bit;
+            seen.proven = if good { seen.proven | bit } else { seen.proven & !bit };
+        } else {
+            let shift = (LOG_ODDS_UNIT * (accuracy / (1.0 - accuracy)).ln()).round() as i16;
+            let log_odds = &mut seen.log_odds[index];
+            *log_odds = log_odds.saturating_add(if good { shift } else { -shift });
         }
         // A balance that falls back below 2 makes a rock worth a check again.
         let settled = seen.certain & bit != 0 || seen.checks[index] >= 5 || balance.abs() >= 2;
@@ -188,7 +199,8 @@ impl RockSample {
     pub fn state(&self, good: impl Fn(usize) -> bool) -> State {
         let good = (0..self.rocks.len()).filter(|&rock| good(rock)).fold(0, |bits, rock| bits | 1 << rock);
         let balance = [0; MOST_ROCKS];
-        let seen = Seen { balance, checks: [0; MOST_ROCKS], liked: 0, disliked: 0, certain: 0, settled: 0 };
+        let (checks, log_odds) = ([0; MOST_ROCKS], [0; MOST_ROCKS]);
+        let seen = Seen { balance, checks, liked: 0, disliked: 0, certain: 0, proven: 0, log_odds, settled: 0 };
         State { cell: self.start, good, sampled: 0, seen }
     }
 
@@ -361,8 +373,10 @@ impl Policy<RockSample> for Advice {
 }
 
 mod posterior;
+mod tour;
 
 pub use posterior::Posterior;
+pub use tour::{Plan, Tour};
 
 #[cfg(test)]
 mod tests;

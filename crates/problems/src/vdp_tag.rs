@@ -37,6 +37,8 @@ const PERIOD_SECS: f64 = 0.1;
 const STEPS: usize = 5;
 /// Standard deviation of the target's drift in a step, m.
 const DRIFT: f64 = 0.05;
+/// √det of the covariance of the target above which [`Chase`] looks, m².
+const UNSURE: f64 = 0.01;
 /// Begin and length of the walls along the axes, m.
 const WALLS: (f64, f64) = (0.2, 2.8);
 
@@ -182,13 +184,23 @@ impl Policy<VdpTag> for Wander {
     }
 }
 
-/// Makes for where the target will be. It looks at the target's place.
+/// Makes for where the target will be. It looks at the target's place. On a belief it makes for where the mean will be, and pays for a look while √det of the
+/// covariance of the targets is above 0.01 m²: the better of the published simple policies.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Chase;
 
 impl Policy<VdpTag> for Chase {
     fn action(&self, _model: &VdpTag, state: &State, _rng: &mut Rng) -> Action {
         towards(state.agent, state.target)
+    }
+
+    fn belief_action(&self, _model: &VdpTag, belief: &[(State, f64)], _rng: &mut Rng) -> Action {
+        let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
+        let mean = |of: &dyn Fn(&State) -> f64| belief.iter().map(|(s, weight)| weight * of(s)).sum::<f64>() / total;
+        let [x, y] = [0, 1].map(|axis| mean(&|s| s.target[axis]));
+        let covariance = |i: usize, j: usize| mean(&|s| (s.target[i] - [x, y][i]) * (s.target[j] - [x, y][j]));
+        let determinant = covariance(0, 0) * covariance(1, 1) - covariance(0, 1).powi(2);
+        Action { look: determinant.max(0.0).sqrt() > UNSURE, ..towards(belief[0].0.agent, [x, y]) }
     }
 }
 

@@ -37,8 +37,7 @@ fn config(simulations: usize, exploration: f64) -> Config {
         observations: Observations::Classes,
         backup: Backup::Mean,
         nodes: 1 << 24,
-        trees: 1,
-        threads: 1,
+        ..Config::default()
     }
 }
 

@@ -1,9 +1,12 @@
 //! What can be chosen for a row: of the search, of the belief, of the actions.
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Context as _, Result};
 use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, RolloutDepth};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
+
+/// Options that are not written where they have their default.
+const UNWRITTEN: [&str; 2] = ["planner.choice", "planner.branch_states"];
 
 /// What a new leaf of a search is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,6 +18,8 @@ pub enum Leaf {
     Random,
     /// What the problem's heuristic returns.
     Heuristic,
+    /// RockSample: the expected return of a plan for what is known.
+    Plan,
 }
 
 /// Options of a row.
@@ -47,8 +52,7 @@ impl Options {
             observations: Observations::Widening { factor, exponent },
             backup: Backup::Mean,
             nodes: 1 << 24,
-            trees: 1,
-            threads: 1,
+            ..Config::default()
         };
         Self { planner, leaf: Leaf::FullInformation, horizon: 100, particles: 0, directions: 0, aims: 0 }
     }
@@ -63,14 +67,18 @@ impl Options {
             .with_context(|| format!("the value of {key} is no TOML: {value}"))?;
         let mut options = serde_json::to_value(self)?;
         let mut at = &mut options;
+        let unknown = || format!("there is no option {key}: expected one of {}", json!(self));
         for part in key.split('.') {
-            match at.get_mut(part) {
-                Some(next) => at = next,
-                None => bail!("there is no option {key}: expected one of {}", json!(self)),
-            }
+            let table = at.as_object_mut().with_context(unknown)?;
+            // Not written where it has its default.
+            let unwritten = UNWRITTEN.contains(&key);
+            at = if unwritten {
+                table.entry(part).or_insert(Value::Null)
+            } else {
+                table.get_mut(part).with_context(unknown)?
+            };
         }
         *at = serde_json::to_value(&given["value"])?;
-        let options: Value = options;
         serde_json::from_value(options).with_context(|| format!("{key} cannot be {value}"))
     }
 }
@@ -86,6 +94,8 @@ mod tests {
             options.with("planner.exploration", "{ fixed = 30.0 }").unwrap().with("leaf", "\"random\"").unwrap();
         assert_eq!(changed.planner.exploration, Exploration::Fixed(30.0));
         assert_eq!((changed.leaf, changed.planner.depth), (Leaf::Random, 20));
+        let states = options.with("planner.branch_states", "5").unwrap().planner.branch_states;
+        assert_eq!(states, 5, "an option that is not written at its default can be set");
         let unknown = options.with("planner.deep", "3").unwrap_err().to_string();
         assert!(unknown.starts_with("there is no option planner.deep"), "{unknown}");
         assert_eq!(options.with("particles", "-3").unwrap_err().to_string(), "particles cannot be -3");

@@ -4,7 +4,7 @@ use planner::{Observations, Pomcp, Pomcpow, SearchReport};
 use pomdp::{Belief as _, Policy, Purpose, Rng, Seed, UniformPolicy};
 use problems::bits::Advice;
 use problems::finite::{ExactBelief, Finite, FullInformation};
-use problems::rock_sample::Posterior;
+use problems::rock_sample::{Posterior, Tour};
 use problems::vdp_tag::{self, Chase, Wander};
 use problems::{InitialState, LaserTag, LightDark, Particles, RockSample, SubHunt, VdpTag, episode};
 
@@ -77,7 +77,7 @@ where
     M::Key: Send,
 {
     let policy: &(dyn Policy<M> + Sync) = match options.leaf {
-        Leaf::FullInformation | Leaf::Heuristic => known,
+        Leaf::FullInformation | Leaf::Heuristic | Leaf::Plan => known,
         Leaf::Random => &UniformPolicy,
     };
     let start_secs = thread_secs();
@@ -136,6 +136,7 @@ pub(super) fn rock_sample(options: &Options) -> impl Fn(Seed, u64) -> Played {
         let Streams { mut world, mut search, mut belief } = Streams::of(seed, item);
         let model = RockSample::random(15, 15, &mut seed.stream(Purpose::World, item));
         let advice = Advice::default();
+        let policy: &(dyn Policy<RockSample> + Sync) = if options.leaf == Leaf::Plan { &Tour } else { &advice };
         let mut searches = Searches::default();
         let mut planner = Pomcp::new(options.planner.clone()).expect(VALID);
         let start = model.initial(&mut world);
@@ -145,7 +146,7 @@ pub(super) fn rock_sample(options: &Options) -> impl Fn(Seed, u64) -> Played {
                 planner.prune(action, observation);
             }
             let particles = posterior.particles(&model, options.particles, &mut belief);
-            searches.count(|| planner.search(&model, &particles, &advice, left, &mut search))
+            searches.count(|| planner.search(&model, &particles, policy, left, &mut search))
         };
         let learn = |(posterior, _): (Posterior, _), action: &_, seen: &_, _: &mut Rng| {
             (posterior.update(&model, action, seen), Some((*action, *seen)))

@@ -126,8 +126,7 @@ fn config(budget: Budget, depth: usize) -> Config {
         observations: Observations::Classes,
         backup: Backup::Mean,
         nodes: 1 << 24,
-        trees: 1,
-        threads: 1,
+        ..Config::default()
     }
 }
 

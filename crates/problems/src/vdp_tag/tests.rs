@@ -152,3 +152,20 @@ fn simple_policies_return_what_was_published() {
         assert!(off.abs() < 4.0, "{name}: {mean} ± {error}, published {published} ± {published_error}");
     }
 }
+
+#[test]
+fn who_chases_a_belief_makes_for_its_mean_and_looks_while_it_is_wide() {
+    // √det of the covariance: 0.25 m² for the corners of a square with sides of 1 m, 0.0025 m² for sides of 0.1 m.
+    let corners = |side: f64, heavy: f64| {
+        [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]
+            .map(|[x, y]| (at([0.0; 2], [2.0 + 0.5 * side * x, 1.0 + 0.5 * side * y]), heavy))
+    };
+    let chase = |belief: &[(State, f64)]| Chase.belief_action(&model(), belief, &mut rng());
+    let (wide, narrow) = (chase(&corners(1.0, 1.0)), chase(&corners(0.1, 7.0)));
+    assert!(wide.look && !narrow.look);
+    let expected = towards([0.0; 2], [2.0, 1.0]).angle;
+    assert!((wide.angle - expected).abs() < 1e-9 && (narrow.angle - expected).abs() < 1e-9);
+    // A state alone is known.
+    let alone = at([0.5, 0.0], [-1.0, 1.0]);
+    assert_eq!(chase(&[(alone, 0.1)]), Chase.action(&model(), &alone, &mut rng()));
+}
