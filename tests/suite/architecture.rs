@@ -9,7 +9,7 @@ use serde_json::Value;
 
 /// Packages with programs that do not train.
 const LIGHT: [&str; 7] =
-    ["datagen", "diagnose-benchmark", "discrepancy", "experiments", "measured-log", "report", "scenario"];
+    ["datagen", "diagnose-benchmark", "discrepancy", "experiments", "import-log", "report", "scenario"];
 
 /// What cargo prints.
 fn cargo(arguments: &[&str]) -> String {
@@ -88,7 +88,7 @@ fn programs_that_are_built_one_by_one_share_their_dependencies_and_do_without_bu
     type Tree = BTreeMap<String, BTreeSet<String>>;
     let tree = |program: &str| -> Tree {
         let options = ["--edges", "normal,build", "--prefix", "none", "--no-dedupe", "--format", "{p}|{f}"];
-        let selection = ["--package", "report", "--package", "measured-log", "--package", program];
+        let selection = ["--package", "report", "--package", "import-log", "--package", program];
         let mut tree = Tree::new();
         for line in cargo(&[&["tree"][..], &selection, &options].concat()).lines() {
             // An empty line between the packages that were selected.

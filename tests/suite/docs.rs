@@ -101,7 +101,7 @@ fn every_option_in_the_documents_exists() {
 fn verbs_of(verb: &str) -> &'static [&'static str] {
     match verb {
         "bench" => &["physics", "calibration", "nudge", "planner", "prior", "accuracy"],
-        "import-log" => &["contactnets", "cmu-push"],
+        "import-log" => &["table", "mcap", "ros2", "lerobot", "contactnets", "cmu-push"],
         "scenario" => &["check", "schema"],
         _ => &[],
     }

@@ -43,7 +43,7 @@ enum Verb {
     /// Makes a recording of an episode for the Rerun viewer; its first build takes long.
     #[command(disable_help_flag = true)]
     Rerun(Rest),
-    /// Turns published measurements into a log that can be diagnosed.
+    /// Turns a recording or published measurements into a log that can be diagnosed.
     #[command(disable_help_flag = true)]
     ImportLog(Rest),
     /// Records a log in the true world of a scenario, to rehearse a diagnosis.

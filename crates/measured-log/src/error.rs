@@ -140,18 +140,6 @@ pub enum Error {
         /// The file that is in the way.
         path: PathBuf,
     },
-    /// A file of another project that is not what its importer expects.
-    #[error("{}, {place}: expected {expected}, found {found}", path.display())]
-    Source {
-        /// The file.
-        path: PathBuf,
-        /// Line, number or column.
-        place: String,
-        /// What was expected.
-        expected: String,
-        /// What was found.
-        found: String,
-    },
 }
 
 impl Error {

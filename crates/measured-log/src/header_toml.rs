@@ -115,6 +115,15 @@ pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
             reason: format!("line {line}: {}", whole_file::one_line(&whole_file::plain(e.message()), MESSAGE)),
         }
     })?;
+    header(path, value)
+}
+
+/// The header that a table of `log.toml` is, which stands in the file `path`.
+///
+/// # Errors
+///
+/// [`Error`] with the key and what was expected.
+pub fn header(path: &Path, value: toml::Table) -> Result<Header, Error> {
     // The version alone comes first, so that an old file says so instead of listing unknown keys.
     if let Some(found) = value.get("version")
         && found.as_integer() != Some(i64::from(VERSION))

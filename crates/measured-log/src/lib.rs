@@ -1,4 +1,4 @@
-//! Logs of real or simulated rigs: read, checked, written, imported.
+//! Logs of real or simulated rigs: read, checked, written.
 //!
 //! ```text
 //! DIR/log.toml           the rig and the nominal model: Header
@@ -6,7 +6,7 @@
 //! DIR/samples.parquet    the same columns
 //! ```
 //!
-//! `docs/src/reference/measured-log.md` describes the format, its units and limits; `docs/src/results/published-logs.md` what the importers found.
+//! `docs/src/reference/measured-log.md` describes the format, its units and limits. The crate `import-log` makes such logs of other recordings.
 //!
 //! Invariants:
 //!
@@ -57,7 +57,6 @@ mod error;
 mod folder;
 mod header;
 mod header_toml;
-pub mod import;
 mod log;
 mod number;
 mod outline;
@@ -70,7 +69,7 @@ pub use channel::{Axis, Channel, Component};
 pub use error::Error;
 pub use folder::{Format, read, write};
 pub use header::{Header, Noise, Object, Robot, Shape, SplitConfig, Table};
-pub use header_toml::Notes;
+pub use header_toml::{Notes, header};
 pub use log::{Episode, Log};
 pub use number::Number;
 pub use readings::Readings;

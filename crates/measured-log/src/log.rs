@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::path::Path;
 
 use crate::error::Problem;
 use crate::header::{Header, Robot, Shape};
-use crate::{Axis, Channel, Component, MAX_ROWS, Readings, UNIT_TOLERANCE, split};
+use crate::{Axis, Channel, Component, Error, MAX_ROWS, Readings, UNIT_TOLERANCE, split};
 
 /// A measured or simulated log.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,6 +74,15 @@ impl Episode {
 }
 
 impl Log {
+    /// Whether it is a valid log.
+    ///
+    /// # Errors
+    ///
+    /// [`Error`] as [`crate::read`] gives for a log in the files `header` and `samples`. Rows count over all episodes.
+    pub fn checked(&self, header: &Path, samples: &Path) -> Result<(), Error> {
+        self.check().map_err(|problem| problem.at(header, samples))
+    }
+
     /// The first thing that makes it no valid log; rows count over all episodes, as in the file.
     pub(crate) fn check(&self) -> Result<(), Problem> {
         self.header.check()?;

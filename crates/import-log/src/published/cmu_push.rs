@@ -5,11 +5,11 @@ use std::io::Read as _;
 use std::path::Path;
 
 use super::rotate;
-use crate::error::excerpt;
-use crate::folder::read_bounded;
-use crate::{
-    Axis, Channel, Component, Episode, Error, Header, Log, MAX_FILE_BYTES, MAX_ROWS, Noise, Notes, Number, Object,
-    Robot, Shape, SplitConfig, Table,
+use crate::Error;
+use crate::error::{excerpt, read};
+use measured_log::{
+    Axis, Channel, Component, Episode, Header, Log, MAX_FILE_BYTES, MAX_ROWS, Noise, Notes, Number, Object, Robot,
+    Shape, SplitConfig, Table,
 };
 
 /// The authors' friction force between triangle and hard board, N (`demo_rand_multi_push.m`; 5.0 N on their wooden board).
@@ -54,13 +54,13 @@ pub fn cmu_push(source: &Path, friction_force_n: f64) -> Result<(Log, Notes), Er
     bottoms.sort_by(f64::total_cmp);
     let table_m = bottoms.get(bottoms.len() / 2).map_or(0.0, |mm| mm / 1000.0);
     let log = Log { header: header(table_m, friction_force_n, feet), episodes };
-    log.check().map_err(|problem| problem.at(source, source))?;
+    log.checked(source, source)?;
     Ok((log, notes(friction_force_n)))
 }
 
 /// The file's text, unpacked where it is gzip, of bounded size.
 fn unpack(path: &Path) -> Result<String, Error> {
-    let bytes = read_bounded(path, MAX_FILE_BYTES)?;
+    let bytes = read(path, MAX_FILE_BYTES)?;
     let mut plain = Vec::new();
     if bytes.starts_with(&[0x1f, 0x8b]) {
         let mut unpacked = flate2::read::MultiGzDecoder::new(bytes.as_slice()).take(MAX_FILE_BYTES + 1);

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::rotate;
-use crate::error::excerpt;
-use crate::folder::open_bounded;
-use crate::{
-    Axis, Channel, Component, Episode, Error, Header, Log, MAX_FILE_BYTES, MAX_ROWS, Noise, Notes, Number, Object,
-    Readings, Robot, Shape, SplitConfig, Table,
+use crate::Error;
+use crate::error::{excerpt, open};
+use measured_log::{
+    Axis, Channel, Component, Episode, Header, Log, MAX_ROWS, Noise, Notes, Number, Object, Readings, Robot, Shape,
+    SplitConfig, Table,
 };
 
 const COLUMNS: [&str; 15] = [
@@ -39,7 +39,7 @@ const COLUMNS: [&str; 15] = [
 /// [`Error`] where the source cannot be read or has another layout.
 pub fn contactnets(source: &Path) -> Result<(Log, Notes), Error> {
     let path = locate(source)?;
-    let file = open_bounded(&path, MAX_FILE_BYTES)?;
+    let file = open(&path)?;
     let wrong = |place: String, expected: &str, found: String| Error::Source {
         path: path.clone(),
         place,
@@ -78,7 +78,7 @@ pub fn contactnets(source: &Path) -> Result<(Log, Notes), Error> {
         }
     }
     let log = Log { header: header(), episodes };
-    log.check().map_err(|problem| problem.at(&path, &path))?;
+    log.checked(&path, &path)?;
     Ok((log, notes()))
 }
 

@@ -5,7 +5,8 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use measured_log::{Axis, Channel, Episode, Log, Shape, import};
+use import_log::published;
+use measured_log::{Axis, Channel, Episode, Log, Shape};
 use proptest::prelude::*;
 
 /// The published data; where they are not there, `None`, and the test counts as skipped.
@@ -58,22 +59,22 @@ fn close(found: f64, expected: f64) -> bool {
 #[test]
 fn angular_velocity_of_a_toss_is_turned_to_world_axes() {
     let (folder, path) = source("tosses_2.csv", TOSSES);
-    let (log, _) = import::contactnets(&path).unwrap();
+    let (log, _) = published::contactnets(&path).unwrap();
     assert_eq!(log.episodes.iter().map(|e| (e.id, e.rows())).collect::<Vec<_>>(), [(0, 2), (1, 1)]);
     let spin = log.episodes[0].vector(Channel::ObjectSpin, 1).unwrap();
     assert!(spin.iter().zip([-3.68, 5.24, 6.0]).all(|(found, expected)| close(*found, expected)), "{spin:?}");
     assert_eq!(log.episodes[1].vector(Channel::ObjectVelocity, 0), Some([1.0, 2.0, 3.0]));
     assert_eq!(log.episodes[0].orientation(0), Some([0.0, 0.0, 0.6, 0.8]));
-    assert_eq!(import::contactnets(folder.path()).unwrap().0, log, "a folder with one table");
+    assert_eq!(published::contactnets(folder.path()).unwrap().0, log, "a folder with one table");
     std::fs::write(folder.path().join("tosses_3.csv"), TOSSES).unwrap();
-    let message = import::contactnets(folder.path()).unwrap_err().to_string();
+    let message = published::contactnets(folder.path()).unwrap_err().to_string();
     assert!(message.ends_with("expected exactly one file tosses_*.csv, found 2"), "{message}");
 }
 
 #[test]
 fn a_push_is_in_metres_and_base_axes_and_nothing_is_resampled() {
     let (_folder, path) = source(PUSH_NAME, &pushes());
-    let (log, _) = import::cmu_push(&path, import::HARD_BOARD_N).unwrap();
+    let (log, _) = published::cmu_push(&path, published::HARD_BOARD_N).unwrap();
     let Shape::Prism { feet_m, .. } = &log.header.object.shape else { panic!("{:?}", log.header.object.shape) };
     for (found, expected) in feet_m.iter().flatten().zip([-0.04, -0.04, 0.08, -0.035, -0.03, 0.08]) {
         assert!(close(*found, expected), "{feet_m:?}");
@@ -101,7 +102,7 @@ fn a_push_is_in_metres_and_base_axes_and_nothing_is_resampled() {
 #[test]
 fn packed_pushes_and_folders_named_after_the_feet_are_read() {
     let (folder, path) = source(PUSH_NAME, &pushes());
-    let whole = import::cmu_push(&path, 5.0).unwrap().0;
+    let whole = published::cmu_push(&path, 5.0).unwrap().0;
     for (place, expected_feet) in [("wood_10_130_20_10_15_130", 3), ("patch", 0)] {
         let place = folder.path().join(place);
         std::fs::create_dir(&place).unwrap();
@@ -109,14 +110,14 @@ fn packed_pushes_and_folders_named_after_the_feet_are_read() {
         packed.write_all(pushes().as_bytes()).unwrap();
         let path = place.join("exp.txt.gz");
         std::fs::write(&path, packed.finish().unwrap()).unwrap();
-        let log = import::cmu_push(&path, 5.0).unwrap().0;
+        let log = published::cmu_push(&path, 5.0).unwrap().0;
         assert_eq!(log.episodes, whole.episodes);
         let Shape::Prism { feet_m, .. } = log.header.object.shape else { panic!("no prism") };
         assert_eq!(feet_m.len(), expected_feet);
     }
     let other = folder.path().join("exp.txt");
     std::fs::write(&other, pushes()).unwrap();
-    let message = import::cmu_push(&other, 5.0).unwrap_err().to_string();
+    let message = published::cmu_push(&other, 5.0).unwrap_err().to_string();
     assert!(message.contains("expected the feet in mm as x1_x2_x3_y1_y2_y3, or patch"), "{message}");
 }
 
@@ -124,7 +125,7 @@ fn packed_pushes_and_folders_named_after_the_feet_are_read() {
 fn damaged_sources_are_answered_with_their_place() {
     let refused = |text: &str| {
         let (_folder, path) = source(PUSH_NAME, text);
-        import::cmu_push(&path, 4.2).unwrap_err().to_string()
+        published::cmu_push(&path, 4.2).unwrap_err().to_string()
     };
     let whole = pushes();
     for (from, to, expected) in [
@@ -144,9 +145,9 @@ fn damaged_sources_are_answered_with_their_place() {
     }
     assert!(refused(&format!("{whole} 7")).contains("expected the end of the file, found `7`"));
     let (_folder, path) = source("tosses_1.csv", &TOSSES.replace("t_s", "t_ms"));
-    assert!(import::contactnets(&path).unwrap_err().to_string().contains("row of names"));
+    assert!(published::contactnets(&path).unwrap_err().to_string().contains("row of names"));
     let (_folder, path) = source("tosses_1.csv", &TOSSES.replacen("0.5", "inf", 1));
-    let message = import::contactnets(&path).unwrap_err().to_string();
+    let message = published::contactnets(&path).unwrap_err().to_string();
     assert!(message.contains("row 1, column z_m: expected a finite number, found `inf`"), "{message}");
 }
 
@@ -171,7 +172,7 @@ proptest! {
         for (name, bytes) in [(PUSH_NAME, push), ("tosses_1.csv", mutate(TOSSES))] {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            let imported = if name == PUSH_NAME { import::cmu_push(&path, 4.2) } else { import::contactnets(&path) };
+            let imported = if name == PUSH_NAME { published::cmu_push(&path, 4.2) } else { published::contactnets(&path) };
             if let Err(error) = imported {
                 let message = error.to_string();
                 prop_assert!(message.contains(name) && !message.contains('\n'), "{}", message);
@@ -191,7 +192,7 @@ fn the_program_writes_a_log_that_reads_back_and_refuses_with_2() {
         let out = folder.path().join(format);
         let output = run(&path, &out, format);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        assert_eq!(measured_log::read(&out).unwrap(), import::contactnets(&path).unwrap().0);
+        assert_eq!(measured_log::read(&out).unwrap(), published::contactnets(&path).unwrap().0);
         let text = std::fs::read_to_string(out.join("log.toml")).unwrap();
         assert!(text.contains("BSD-3-Clause") && text.contains("half-width"), "{text}");
         assert_eq!(run(&path, &out, format).status.code(), Some(2), "there is a log already");
@@ -250,7 +251,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 #[test]
 fn published_tosses_fall_two_percent_too_slowly_and_rest_two_percent_too_low() {
     let Some(source) = data("contactnets_cube") else { return };
-    let (log, _) = import::contactnets(&source).unwrap();
+    let (log, _) = published::contactnets(&source).unwrap();
     assert_eq!((log.episodes.len(), log.episodes.iter().map(Episode::rows).sum::<usize>()), (40, 4117));
     let flights: Vec<_> = log.episodes.iter().map(flight).filter(|f| f.len() >= 12).collect();
     assert!(flights.len() > 30, "{}", flights.len());
@@ -273,7 +274,7 @@ fn published_tosses_fall_two_percent_too_slowly_and_rest_two_percent_too_low() {
 #[test]
 fn published_velocities_of_tosses_fit_their_poses_in_world_axes_half_a_frame_late() {
     let Some(source) = data("contactnets_cube") else { return };
-    let (log, _) = import::contactnets(&source).unwrap();
+    let (log, _) = published::contactnets(&source).unwrap();
     let (mut late, mut spin_errors, mut count) = (Vec::new(), 0.0, 0.0);
     for episode in &log.episodes {
         let points = flight(episode);
@@ -387,7 +388,7 @@ fn published_pushes_push_inwards_and_turn_the_object_as_it_turned() {
     for (name, pushes) in
         [("10_130_10_10_10_130__exp_08_17_50.txt.gz", 50), ("30_90_30_30_30_90__exp_08_11_30.txt.gz", 30)]
     {
-        let (log, _) = import::cmu_push(&folder.join(name), import::HARD_BOARD_N).unwrap();
+        let (log, _) = published::cmu_push(&folder.join(name), published::HARD_BOARD_N).unwrap();
         assert_eq!(log.episodes.len(), pushes);
         check_pushes(&log);
     }

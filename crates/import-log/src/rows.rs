@@ -1,0 +1,218 @@
+//! From the rows of a table to readings.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::Error;
+use crate::error::excerpt;
+use crate::mapping::{Mapping, Sampling};
+use crate::plan::{Part, Pick, Plan, Quantity, Stamp};
+use crate::store::{Moment, Store};
+use crate::value::Value;
+
+/// Names of the elements of columns that hold lists.
+pub(crate) type ElementNames = BTreeMap<String, Vec<String>>;
+
+/// A column, or an element of the lists in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub(crate) column: usize,
+    pub(crate) element: Option<usize>,
+}
+
+#[derive(Clone, Copy)]
+enum Source {
+    Constant(f64),
+    Cell(Place),
+}
+
+/// Takes from each row of a table what a plan asks for.
+pub(crate) struct Extractor<'a> {
+    plan: &'a Plan,
+    path: &'a Path,
+    names: Vec<String>,
+    /// Of each track, its numbers and its stamp.
+    tracks: Vec<(Vec<Source>, Place)>,
+    row: u64,
+    picked: Vec<f64>,
+}
+
+impl<'a> Extractor<'a> {
+    /// Looks up the columns of a plan among `names`.
+    pub(crate) fn new(
+        mapping: &Mapping,
+        plan: &'a Plan,
+        path: &'a Path,
+        names: Vec<String>,
+        elements: &ElementNames,
+    ) -> Result<Self, Error> {
+        let find = |key: &str, text: &str| {
+            place(&names, elements, text).ok_or_else(|| {
+                let some = names.iter().map(|name| excerpt(name)).take(40).collect::<Vec<_>>().join(", ");
+                let reason = format!("expected a column of {} ({some}), found {}", path.display(), excerpt(text));
+                mapping.wrong(key, reason)
+            })
+        };
+        let mut tracks = Vec::new();
+        for track in &plan.tracks {
+            let key = track.quantity.key();
+            let mut sources = Vec::new();
+            for pick in &track.picks {
+                sources.push(match pick {
+                    Pick::Constant(value) => Source::Constant(*value),
+                    Pick::Value { path, part: Part::All } => Source::Cell(find(key, path)?),
+                    Pick::Value { path, part: Part::Of(element, _) } => {
+                        let place = find(key, path)?;
+                        Source::Cell(Place { column: place.column, element: place.element.or(*element) })
+                    }
+                    Pick::Value { .. } => {
+                        let reason = "expected a list of columns in a table, found names and order";
+                        return Err(mapping.wrong(format!("{key}.names"), reason));
+                    }
+                });
+            }
+            let Stamp::Field(column) = &track.stamp else {
+                return Err(mapping.wrong("clock.stamp", "expected the name of a column, found none"));
+            };
+            tracks.push((sources, find("clock.stamp", column)?));
+        }
+        Ok(Self { plan, path, names, tracks, row: 0, picked: Vec::new() })
+    }
+
+    /// The columns that are asked for.
+    pub(crate) fn columns(&self) -> Vec<usize> {
+        let cells = self.tracks.iter().flat_map(|(sources, stamp)| {
+            let cell = |source: &Source| if let Source::Cell(place) = source { Some(place.column) } else { None };
+            sources.iter().filter_map(cell).chain([stamp.column])
+        });
+        let mut columns: Vec<usize> = cells.collect();
+        columns.sort_unstable();
+        columns.dedup();
+        columns
+    }
+
+    /// Takes the readings of a row, whose cells `cell` gives.
+    pub(crate) fn row(&mut self, store: &mut Store, cell: &dyn Fn(Place) -> Value) -> Result<(), Error> {
+        self.row += 1;
+        let keep_rows = self.plan.sample == Sampling::Rows;
+        let shift = if keep_rows { 0.0 } else { self.shift(store, cell) };
+        for (index, (track, (sources, stamp))) in self.plan.tracks.iter().zip(&self.tracks).enumerate() {
+            if track.fixed().is_some() {
+                continue;
+            }
+            let time = match moment(&cell(*stamp), self.plan.clock_unit_secs) {
+                Some(moment) => store.seconds(moment) + shift + track.offset_secs,
+                None => return Err(self.wrong(*stamp, "a time as a number", &cell(*stamp))),
+            };
+            self.picked.clear();
+            for source in sources {
+                let value = match source {
+                    Source::Constant(value) => *value,
+                    Source::Cell(place) => match cell(*place) {
+                        Value::Missing => f64::NAN,
+                        value if track.quantity == Quantity::Label => {
+                            value.words().map_or(f64::NAN, |words| store.label(&words))
+                        }
+                        value => match value.number() {
+                            Some(number) => number,
+                            None => return Err(self.wrong(*place, "a finite number or nothing", &value)),
+                        },
+                    },
+                };
+                self.picked.push(value);
+            }
+            track.convert(&mut self.picked);
+            if keep_rows || !self.picked.iter().all(|value| value.is_nan()) {
+                store.push(index, time, &self.picked).map_err(|full| too_large(self.path, full.limit))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Where episodes are named, what keeps them apart.
+    fn shift(&self, store: &mut Store, cell: &dyn Fn(Place) -> Value) -> f64 {
+        let Some(index) = self.plan.index(Quantity::Label) else { return 0.0 };
+        let (sources, stamp) = &self.tracks[index];
+        let Some(time) = moment(&cell(*stamp), self.plan.clock_unit_secs) else { return 0.0 };
+        let [Source::Cell(place)] = sources[..] else { return 0.0 };
+        let label = cell(place).words().map_or(f64::NAN, |words| store.label(&words));
+        let time = store.seconds(time);
+        store.shift(label, time)
+    }
+
+    fn wrong(&self, place: Place, expected: &str, found: &Value) -> Error {
+        let words = match found {
+            Value::Missing => "nothing".into(),
+            Value::List(_) => "a list: name an element as in name[0]".into(),
+            value => excerpt(&value.words().unwrap_or_default()),
+        };
+        let hint = if words.contains(',') { " (table.decimal = \",\" reads a decimal comma)" } else { "" };
+        let name = &self.names[place.column];
+        let element = place.element.map_or_else(String::new, |element| format!("[{element}]"));
+        let where_ = format!("row {}, column {}{element}", self.row, excerpt(name));
+        Error::source(self.path, where_, expected, format!("{words}{hint}"))
+    }
+}
+
+/// More was asked for than is kept in memory.
+pub(crate) fn too_large(path: &Path, limit: usize) -> Error {
+    Error::TooLarge {
+        path: path.to_owned(),
+        what: "numbers that a mapping takes from a source",
+        limit: limit as u64,
+        found: limit as u64 + 1,
+    }
+}
+
+/// The column that a text names: as it stands, or `name[2]`, or `name[element]`.
+pub(crate) fn place(names: &[String], elements: &ElementNames, text: &str) -> Option<Place> {
+    if let Some(column) = names.iter().position(|name| name == text) {
+        return Some(Place { column, element: None });
+    }
+    let (name, element) = text.strip_suffix(']')?.split_once('[')?;
+    let column = names.iter().position(|other| other == name)?;
+    let named = || elements.get(name)?.iter().position(|other| other == element);
+    Some(Place { column, element: Some(element.parse().ok().or_else(named)?) })
+}
+
+/// A time of a clock whose unit is `unit_secs`. Whole numbers stay exact: nanoseconds since 1970 have more digits than a float.
+#[expect(clippy::cast_possible_truncation, reason = "1, 1e3, 1e6 or 1e9")]
+pub(crate) fn moment(value: &Value, unit_secs: f64) -> Option<Moment> {
+    let whole = match value {
+        Value::Whole(whole) => Some(*whole),
+        Value::Text(text) => text.trim().parse().ok(),
+        _ => None,
+    };
+    let unit_nanos = (unit_secs * 1e9).round() as i128;
+    match whole.and_then(|whole| whole.checked_mul(unit_nanos)) {
+        // Differences must not overflow.
+        Some(nanos) if nanos.unsigned_abs() < 1 << 120 => Some(Moment::Nanos(nanos)),
+        _ => value.number().map(|number| Moment::Secs(number * unit_secs)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_found_by_name_by_place_and_by_the_name_of_an_element() {
+        let names = ["t", "observation.state", "a[0]"].map(String::from);
+        let elements = ElementNames::from([("observation.state".into(), vec!["x.pos".into(), "y.pos".into()])]);
+        let find = |text| place(&names, &elements, text).map(|place| (place.column, place.element));
+        assert_eq!(find("t"), Some((0, None)));
+        assert_eq!(find("a[0]"), Some((2, None)), "a name with brackets");
+        assert_eq!(find("observation.state[1]"), Some((1, Some(1))));
+        assert_eq!(find("observation.state[y.pos]"), Some((1, Some(1))));
+        assert_eq!(find("observation.state[z.pos]"), None);
+        assert_eq!(find("observation.stat"), None);
+    }
+
+    #[test]
+    fn nanoseconds_since_1970_stay_exact() {
+        let text = Value::Text("1700000000123456789".into());
+        assert_eq!(moment(&text, 1e-9), Some(Moment::Nanos(1_700_000_000_123_456_789)));
+        assert_eq!(moment(&Value::Text("12.5".into()), 0.001), Some(Moment::Secs(0.0125)));
+        assert_eq!(moment(&Value::Text("yesterday".into()), 1.0), None);
+    }
+}
