@@ -82,7 +82,7 @@ impl<'a> Builder<'a> {
             return Err(self.mapping.wrong(key("topic"), "expected none, as a table has no topics, found one"));
         }
         let offset_secs = offset_secs + self.mapping.raw.clock.offset_secs;
-        if !(offset_secs.abs() <= 1e6) {
+        if !(-1e6..=1e6).contains(&offset_secs) {
             let reason = format!("expected a shift of at most 1e6 s, found {offset_secs}");
             return Err(self.mapping.wrong(key("offset_secs"), reason));
         }

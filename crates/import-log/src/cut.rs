@@ -137,7 +137,7 @@ fn moving(times: &[f64], position: &dyn Fn(usize) -> [f64; 3], within: f64, long
     let mut ranges = Vec::new();
     let mut start = 0;
     let after = |time: f64| times.partition_point(|t| *t < time);
-    for phase in phases.into_iter().chain([times.len()..times.len()]) {
+    for phase in phases.into_iter().chain(std::iter::once(times.len()..times.len())) {
         let stop = if phase.is_empty() { times.len() } else { after(times[phase.start] + 0.5 * longest) };
         // What is still from its first reading to its last is no episode.
         let moves = (start..stop).any(|i| !near(position(start), position(i)));

@@ -33,7 +33,7 @@ pub enum Error {
         /// The source.
         path: PathBuf,
         /// What is wrong with it; rows count over all episodes of the log.
-        source: measured_log::Error,
+        source: Box<measured_log::Error>,
     },
     /// A source with more than can be read in bounded memory.
     #[error("{} is too large: expected at most {limit} {what}, found {found}", path.display())]

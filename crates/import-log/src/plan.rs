@@ -231,7 +231,7 @@ fn grid(mapping: &Mapping, kind: Kind, tracks: &[Track]) -> Result<(Sampling, f6
         }
     }
     let near = raw.grid.and_then(|grid| grid.near_secs).unwrap_or(2.0 * mapping.header.period_secs);
-    if !(near >= 0.0 && near <= 60.0) {
+    if !(0.0..=60.0).contains(&near) {
         return Err(mapping.wrong("grid.near_secs", format!("expected 0 to 60 s, found {near}")));
     }
     Ok((sample, near))

@@ -30,20 +30,20 @@ pub(crate) struct RawRigid {
 impl RawRigid {
     /// The transform, or the key below this one that is wrong, and why.
     pub(crate) fn resolve(&self) -> Result<Rigid, (&'static str, String)> {
-        if let Some(wrong) = self.translation_m.iter().find(|v| !(v.abs() <= 1000.0)) {
+        if let Some(wrong) = self.translation_m.iter().find(|v| !(-1000.0..=1000.0).contains(*v)) {
             return Err(("translation_m", format!("expected -1000 to 1000 m, found {wrong}")));
         }
         let rotation = match (self.quaternion_xyzw, self.rpy_deg, self.matrix) {
             (None, None, None) => [0.0, 0.0, 0.0, 1.0],
             (Some(q), None, None) => {
                 let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
-                if !((norm - 1.0).abs() < TOLERANCE) {
+                if (norm - 1.0).abs() >= TOLERANCE || norm.is_nan() {
                     return Err(("quaternion_xyzw", format!("expected a unit quaternion, found one of norm {norm}")));
                 }
                 q.map(|v| v / norm)
             }
             (None, Some(rpy), None) => {
-                if let Some(wrong) = rpy.iter().find(|v| !(v.abs() <= 1e4)) {
+                if let Some(wrong) = rpy.iter().find(|v| !(-1e4..=1e4).contains(*v)) {
                     return Err(("rpy_deg", format!("expected angles in degrees, found {wrong}")));
                 }
                 from_rpy(rpy.map(f64::to_radians))
@@ -103,7 +103,7 @@ fn from_matrix(m: &[Vec3; 3]) -> Result<Quaternion, String> {
     for i in 0..3 {
         for j in i..3 {
             let expected = if i == j { 1.0 } else { 0.0 };
-            if !((dot(i, j) - expected).abs() < TOLERANCE) {
+            if (dot(i, j) - expected).abs() >= TOLERANCE || dot(i, j).is_nan() {
                 return Err(format!("expected orthonormal rows, found {} for rows {} and {}", dot(i, j), i + 1, j + 1));
             }
         }
