@@ -99,6 +99,7 @@ pub(crate) fn import(
         return Err(Error::source(&path, "as a whole", "at least one episode with a reading", "none"));
     }
     let log = Log { header: mapping.header.clone(), episodes: done };
-    log.checked(&mapping.path, Path::new("samples")).map_err(|source| Error::Made { path, source: Box::new(source) })?;
+    log.checked(&mapping.path, Path::new("samples"))
+        .map_err(|source| Error::Made { path, source: Box::new(source) })?;
     Ok(log)
 }
