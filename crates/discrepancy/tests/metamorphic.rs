@@ -6,11 +6,11 @@ use discrepancy::{Nominal, Report, Settings, diagnose, rig_tool};
 use measured_log::{Axis, Channel, Component, Log, Number, Readings, Shape};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// What eight episodes show.
+/// What a dozen episodes show.
 fn log(set: &str) -> Log {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
     let mut log = measured_log::read(&folder.join(set)).unwrap();
-    log.episodes.truncate(8);
+    log.episodes.truncate(12);
     log
 }
 
