@@ -41,7 +41,7 @@ fn attempt(kind: Source, bytes: &[u8], mapping: &Mapping) -> Result<Log, Error> 
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording");
     std::fs::write(&path, bytes).unwrap();
-    let _ = draft(kind, &[path.clone()]).map_err(|error| one_sentence(&error, "recording"));
+    let _ = draft(kind, std::slice::from_ref(&path)).map_err(|error| one_sentence(&error, "recording"));
     kind.import(&[path], mapping)
 }
 

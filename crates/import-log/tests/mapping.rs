@@ -177,7 +177,7 @@ fn topics_and_paths_that_are_not_there_are_named_with_what_is() {
 #[test]
 fn a_draft_for_our_own_columns_works_as_it_is() {
     let source = data().join("original/samples.csv");
-    let text = draft(Source::Table, &[source.clone()]).unwrap();
+    let text = draft(Source::Table, std::slice::from_ref(&source)).unwrap();
     let mapping = Mapping::parse(Path::new("draft.toml"), &text).unwrap();
     assert!(mapping.unfilled() > 0, "sizes and mass stand in no table");
     let log = Source::Table.import(&[source], &mapping).unwrap();
