@@ -6,10 +6,14 @@ use discrepancy::{Nominal, Report, Settings, diagnose, rig_tool};
 use measured_log::{Axis, Channel, Component, Log, Number, Readings, Shape};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+fn whole(set: &str) -> Log {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
+    measured_log::read(&folder.join(set)).unwrap()
+}
+
 /// What a dozen episodes show.
 fn log(set: &str) -> Log {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
-    let mut log = measured_log::read(&folder.join(set)).unwrap();
+    let mut log = whole(set);
     log.episodes.truncate(12);
     log
 }
@@ -181,8 +185,8 @@ fn lengths_and_gravity_may_be_in_any_unit() {
 
 #[test]
 fn frame_order_sign_and_time_of_a_log_may_be_any() {
-    // Damping has no direction.
-    let plain = log("set-004");
+    // Damping has no direction. A dozen episodes do not show one this weak.
+    let plain = whole("set-004");
     let expected = report(&plain);
     assert!(!expected.effects.is_empty(), "{}", expected.summary);
     let mut other = turned(plain, 2.0);
