@@ -95,17 +95,9 @@ impl Mapping {
 }
 
 fn key_error(path: &Path, error: serde_path_to_error::Error<toml::de::Error>) -> Error {
-    let mut key = whole_file::one_line(&error.path().to_string(), 200);
+    let key = whole_file::one_line(&error.path().to_string(), 200);
     let reason = whole_file::one_line(error.into_inner().message(), MESSAGE);
-    // serde reports an unknown or a missing key on its table: the key itself stands in the message.
-    let named = ["unknown field `", "missing field `"].iter().find_map(|start| reason.strip_prefix(start));
-    if let Some(name) = named.and_then(|m| m.split('`').next())
-        && key != name
-        && !key.ends_with(&format!(".{name}"))
-    {
-        key = if key == "." { name.to_string() } else { format!("{key}.{name}") };
-    }
-    Error::Key { path: path.to_owned(), key, reason: whole_file::plain(&reason) }
+    Error::Key { path: path.to_owned(), key: whole_file::key_of(&key, &reason), reason: whole_file::plain(&reason) }
 }
 
 /// The header of the log: a `log.toml` in a table of the mapping.

@@ -131,16 +131,9 @@ pub fn header(path: &Path, value: toml::Table) -> Result<Header, Error> {
         return Err(Error::Version { path: path.to_owned(), found: crate::error::excerpt(&found.to_string()) });
     }
     let mut raw: Raw = serde_path_to_error::deserialize(Value::Table(value)).map_err(|error| {
-        let mut key = whole_file::one_line(&error.path().to_string(), 200);
+        let key = whole_file::one_line(&error.path().to_string(), 200);
         let reason = whole_file::one_line(error.into_inner().message(), MESSAGE);
-        // serde reports an unknown or a missing key on its table: the key itself stands in the message.
-        let named = ["unknown field `", "missing field `"].iter().find_map(|start| reason.strip_prefix(start));
-        if let Some(name) = named.and_then(|m| m.split('`').next())
-            && key != name
-            && !key.ends_with(&format!(".{name}"))
-        {
-            key = if key == "." { name.to_string() } else { format!("{key}.{name}") };
-        }
+        let key = whole_file::key_of(&key, &reason);
         Error::Key { path: path.to_owned(), key, reason: whole_file::plain(&reason) }
     })?;
     let mut checked = || -> Result<Header, Problem> {

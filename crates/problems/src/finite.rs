@@ -194,11 +194,26 @@ impl FullInformation {
     where
         M::State: Clone,
     {
-        let mean = |action: &M::Action| {
-            belief.probabilities().map(|(s, p)| p * self.action_value(model, s, action)).sum::<f64>()
-        };
-        best(model, mean)
+        best(model, |action| self.mean_action_value(model, belief.probabilities(), action))
     }
+
+    /// Mean of [`Self::action_value`] over weighted states, times the sum of the weights.
+    fn mean_action_value<'a, M: Finite>(
+        &self,
+        model: &M,
+        belief: impl Iterator<Item = (&'a M::State, f64)>,
+        action: &M::Action,
+    ) -> f64
+    where
+        M::State: 'a,
+    {
+        belief.map(|(state, weight)| weight * self.action_value(model, state, action)).sum()
+    }
+}
+
+/// The states of a belief with their weights.
+fn weighted<S>(belief: &[(S, f64)]) -> impl Iterator<Item = (&S, f64)> {
+    belief.iter().map(|(state, weight)| (state, *weight))
 }
 
 /// The action with the highest value, the first of several.
@@ -219,13 +234,13 @@ impl<M: Finite> Policy<M> for FullInformation {
 
     /// QMDP.
     fn belief_action(&self, model: &M, belief: &[(M::State, f64)], _rng: &mut Rng) -> M::Action {
-        best(model, |action| belief.iter().map(|(s, p)| p * self.action_value(model, s, action)).sum())
+        best(model, |action| self.mean_action_value(model, weighted(belief), action))
     }
 
     /// The value of QMDP: that of one more action for a belief, after which the state is known.
     fn belief_value(&self, model: &M, belief: &[(M::State, f64)], _actions_left: usize) -> f64 {
         let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
-        let value = |action| belief.iter().map(|(s, p)| p * self.action_value(model, s, action)).sum::<f64>();
+        let value = |action| self.mean_action_value(model, weighted(belief), action);
         model.actions().iter().map(value).fold(f64::NEG_INFINITY, f64::max) / total
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use toml::{Table, Value};
-use whole_file::{one_line, plain};
+use whole_file::{key_of, one_line, plain};
 
 use crate::load::{QUOTED, SENTENCE};
 use crate::suggest::with_nearest;
@@ -71,16 +71,10 @@ impl Layers {
             merge(&mut merged, &layer.table);
         }
         let scenario: Scenario = serde_path_to_error::deserialize(Value::Table(merged)).map_err(|error| {
-            let mut key = error.path().to_string();
+            let path = error.path().to_string();
             let message = error.into_inner().message().to_owned();
             let message = message.trim();
-            // serde reports an unknown or a missing key on its table: the key itself stands in the message.
-            let named = ["unknown field `", "missing field `"].iter().find_map(|start| message.strip_prefix(start));
-            if let Some(name) = named.and_then(|m| m.split('`').next())
-                && key.rsplit('.').next() != Some(name)
-            {
-                key = if key == "." { name.to_string() } else { format!("{key}.{name}") };
-            }
+            let key = key_of(&path, message);
             let message = one_line(&plain(&with_nearest(&message.replace('\n', " "))), SENTENCE);
             Error::Key { file: self.origin(&key), key: one_line(&key, QUOTED), message }
         })?;

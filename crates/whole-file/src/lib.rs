@@ -24,7 +24,7 @@ use std::sync::Once;
 
 pub use owner::{Owner, check_owner};
 pub use place::{check_file, check_folder};
-pub use plain::plain;
+pub use plain::{key_of, plain};
 
 /// What to do with a file that is already there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -84,6 +84,26 @@ const SENTENCES: [(&str, &str); 27] = [
 const VALUE: &str = "expected a number, a text in double quotes, a list or a table (JSON has neither NaN nor Infinity)";
 const ESCAPE: &str = "expected an escape that JSON knows, such as \\n or \\u00e9";
 
+/// The dotted path of the key that a message of serde is about, which was met at `path`: an unknown or a missing key is reported on its table, and stands in the
+/// message itself.
+///
+/// ```
+/// use whole_file::key_of;
+/// assert_eq!(key_of("object", "unknown field `colour`, expected `shape`"), "object.colour");
+/// assert_eq!(key_of("object.colour", "unknown field `colour`, expected `shape`"), "object.colour");
+/// assert_eq!(key_of(".", "missing field `object`"), "object");
+/// assert_eq!(key_of("object.mass_kg", "invalid type: string \"far\", expected f64"), "object.mass_kg");
+/// ```
+#[must_use]
+pub fn key_of(path: &str, message: &str) -> String {
+    let named = ["unknown field `", "missing field `"].iter().find_map(|start| message.strip_prefix(start));
+    match named.and_then(|rest| rest.split('`').next()) {
+        Some(name) if path == "." => name.into(),
+        Some(name) if path.rsplit('.').next() != Some(name) => format!("{path}.{name}"),
+        _ => path.into(),
+    }
+}
+
 /// The message of a serde decoder (TOML, JSON or XML) as words: `invalid type: string "far", expected usize` becomes `expected a whole number, 0 or more, found the
 /// text "far"`. What it does not know stays as it is.
 ///

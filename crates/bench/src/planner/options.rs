@@ -5,9 +5,6 @@ use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, R
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-/// Options that are not written where they have their default.
-const UNWRITTEN: [&str; 2] = ["planner.choice", "planner.branch_states"];
-
 /// What a new leaf of a search is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -69,17 +66,15 @@ impl Options {
         let mut at = &mut options;
         let unknown = || format!("there is no option {key}: expected one of {}", json!(self));
         for part in key.split('.') {
-            let table = at.as_object_mut().with_context(unknown)?;
-            // Not written where it has its default.
-            let unwritten = UNWRITTEN.contains(&key);
-            at = if unwritten {
-                table.entry(part).or_insert(Value::Null)
-            } else {
-                table.get_mut(part).with_context(unknown)?
-            };
+            // Some are not written where they have their default.
+            at = at.as_object_mut().with_context(unknown)?.entry(part).or_insert(Value::Null);
         }
         *at = serde_json::to_value(&given["value"])?;
-        serde_json::from_value(options).with_context(|| format!("{key} cannot be {value}"))
+        serde_json::from_value(options).map_err(|error| {
+            let is_unknown = error.to_string().starts_with("unknown field");
+            let context = if is_unknown { unknown() } else { format!("{key} cannot be {value}") };
+            anyhow::Error::from(error).context(context)
+        })
     }
 }
 
