@@ -100,8 +100,9 @@ fn every_option_in_the_documents_exists() {
 /// Verbs that a verb has of its own.
 fn verbs_of(verb: &str) -> &'static [&'static str] {
     match verb {
-        "bench" => &["physics", "calibration", "nudge", "planner", "prior", "accuracy"],
+        "bench" => &["physics", "calibration", "nudge", "planner", "prior", "accuracy", "log-check"],
         "import-log" => &["table", "mcap", "ros2", "lerobot", "contactnets", "cmu-push"],
+        "log" => &["check"],
         "scenario" => &["check", "schema"],
         _ => &[],
     }
@@ -114,7 +115,7 @@ fn one_help(verb: &str, own: Option<&str>) -> String {
 }
 
 /// What the menu lists, without what this machine need not have.
-const VERBS: [&str; 16] = [
+const VERBS: [&str; 17] = [
     "doctor",
     "eval",
     "demo",
@@ -122,6 +123,7 @@ const VERBS: [&str; 16] = [
     "scenario",
     "import-log",
     "record-log",
+    "log",
     "diagnose",
     "datagen",
     "train",

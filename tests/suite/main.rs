@@ -12,6 +12,7 @@ mod doctor;
 mod kills;
 mod library;
 mod licences;
+mod log_check;
 mod output;
 mod pages;
 mod pipeline;

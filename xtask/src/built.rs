@@ -21,7 +21,7 @@ fn package(binary: &str) -> &str {
         "eval" => "experiments",
         "demo" => "report",
         "record-log" | "diagnose-learn" => "diagnose-benchmark",
-        "diagnose" => "discrepancy",
+        "diagnose" | "log" => "discrepancy",
         "docs" => "book",
         // Called like their packages.
         other => other,

@@ -8,7 +8,7 @@ use clap::{Command, CommandFactory as _};
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Try it", &["doctor", "demo", "report", "rerun"]),
     ("Plan: how often does it succeed?", &["eval", "scenario"]),
-    ("Diagnose a log of a robot", &["import-log", "record-log", "diagnose"]),
+    ("Diagnose a log of a robot", &["import-log", "record-log", "log", "diagnose"]),
     ("Train a prior", &["datagen", "train", "calibrate"]),
     ("Measure the project itself", &["bench", "diagnose-benchmark", "diagnose-learn"]),
     ("Develop", &["docs", "ci", "completions"]),

@@ -49,6 +49,9 @@ enum Verb {
     /// Records a log in the true world of a scenario, to rehearse a diagnosis.
     #[command(disable_help_flag = true)]
     RecordLog(Rest),
+    /// Looks at a log before anything is concluded from it: units, frames, sizes, clocks, sensors.
+    #[command(disable_help_flag = true)]
+    Log(Rest),
     /// Finds where a measured log and the simulation disagree, and names the missing effect.
     #[command(disable_help_flag = true)]
     Diagnose(Rest),
@@ -104,6 +107,7 @@ fn main() -> ExitCode {
         Verb::Rerun(rest) => become_viewer(&rest.arguments),
         Verb::ImportLog(rest) => become_program("import-log", &rest.arguments),
         Verb::RecordLog(rest) => become_program("record-log", &rest.arguments),
+        Verb::Log(rest) => become_program("log", &rest.arguments),
         Verb::Diagnose(rest) => become_program("diagnose", &rest.arguments),
         Verb::DiagnoseBenchmark(rest) => become_program("diagnose-benchmark", &rest.arguments),
         Verb::DiagnoseLearn(rest) => become_program("diagnose-learn", &rest.arguments),

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
-use bench::{calibration, nudge, planner, prior, report};
+use bench::{calibration, log_faults, nudge, planner, prior, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
 use serde_json::Value;
@@ -127,6 +127,18 @@ enum What {
         #[arg(long)]
         json: bool,
     },
+    /// How often `log check` sees what is wrong with a log: spoils good ones in 28 ways.
+    #[command(
+        after_help = "Examples:\n  cargo xtask bench log-check tests/data/mujoco-logs/logs/set-002 tests/data/mujoco-logs/logs/set-003"
+    )]
+    LogCheck {
+        /// Folders of good logs with robot = "none".
+        #[arg(required = true)]
+        logs: Vec<PathBuf>,
+        /// Prints one JSON object.
+        #[arg(long)]
+        json: bool,
+    },
     /// Errors against MuJoCo's recorded answers and closed forms: the page in the docs of physics-model.
     #[command(after_help = "Examples:\n  cargo xtask bench accuracy")]
     Accuracy {
@@ -199,6 +211,10 @@ fn run(arguments: &Arguments) -> Result<()> {
             } else {
                 program::show(&prior::table(&result));
             }
+        }
+        What::LogCheck { logs, json } => {
+            let table = log_faults::run(logs)?;
+            program::show(&if *json { table.json()? + "\n" } else { table.markdown() });
         }
         What::Accuracy { write, set } => {
             let selection = Selection { set: set.clone(), ..Selection::new(&root) };

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use log_check::without_dead;
 use measured_log::Log;
 use physics_model::{EffectConfig, EffectKind};
 
@@ -254,7 +255,9 @@ fn diagnose_among(
     progress: &dyn Progress,
     catalogue: &dyn Fn(&Context) -> Vec<Candidate>,
 ) -> Result<Diagnosis, Error> {
-    let log = &*driven(log, name, nominal)?;
+    // A sensor that is not there measures nothing.
+    let alive = without_dead(log);
+    let log = &*driven(alive.as_ref().unwrap_or(log), name, nominal)?;
     let units = Units::of(log);
     let (mut log, tunables) = (units.inverse().log(log), nominal.tunables.clone());
     let period_secs = period_secs(&log);

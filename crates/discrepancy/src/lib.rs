@@ -76,6 +76,7 @@ pub mod touch;
 pub mod trial;
 mod units;
 mod verdict;
+pub mod warning;
 pub mod whitener;
 
 use std::path::Path;

@@ -102,6 +102,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let watched = diagnose_watched(&log, &name, &nominal, &settings, &bar::Bar::new());
     let diagnosis = watched.inspect_err(|_| clean())?;
     let mut report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
+    report.warn(&log, &nominal);
     report.model = arguments.model.as_ref().map(|path| path.display().to_string());
     let json =
         serde_json::to_string_pretty(&report).map_err(|error| Error::Model { reason: error.to_string() })? + "\n";
@@ -172,6 +173,9 @@ fn fold(text: &str) -> Result<[usize; 2], String> {
 }
 
 fn print_summary(report: &Report) {
+    for warning in &report.warnings {
+        program::out!("Check the log: {}", warning.sentence);
+    }
     program::out!("{}", report.summary);
     if let Some(reason) = &report.reason {
         program::out!("  why unknown: {reason}");

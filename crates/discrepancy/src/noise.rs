@@ -54,6 +54,12 @@ impl SensorNoise {
         Self { stddev: factor * self.stddev, scatter: self.scatter.map(|scatter| factor * scatter), ..self }
     }
 
+    /// Whether readings scatter by something else than `log.toml` gives.
+    pub(crate) fn contradicts(&self) -> bool {
+        let ratio = self.scatter.filter(|_| self.source == Source::Given).map(|scatter| scatter / self.stddev);
+        ratio.is_some_and(|ratio| !(CONTRADICTS.recip()..=CONTRADICTS).contains(&ratio))
+    }
+
     /// In words: what was used, and what speaks against it.
     #[must_use]
     pub fn sentence(&self) -> String {
@@ -63,11 +69,8 @@ impl SensorNoise {
             Source::Estimated => "estimated",
             Source::Floor => "smallest that is taken: readings do not say",
         };
-        let ratio = self.scatter.filter(|_| self.source == Source::Given).map(|scatter| scatter / self.stddev);
-        let against = match ratio {
-            Some(ratio) if !(CONTRADICTS.recip()..=CONTRADICTS).contains(&ratio) => {
-                format!(", but readings scatter by {:.2e} {unit}", ratio * self.stddev)
-            }
+        let against = match self.scatter {
+            Some(scatter) if self.contradicts() => format!(", but readings scatter by {scatter:.2e} {unit}"),
             _ => String::new(),
         };
         format!("{name} {:.2e} {unit} ({source}{against})", self.stddev)

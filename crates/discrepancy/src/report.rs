@@ -1,5 +1,6 @@
 //! What a diagnosis says: the contract of `report.json`.
 
+use measured_log::Log;
 use physics_model::EffectKind;
 use serde::Serialize;
 
@@ -11,12 +12,14 @@ use crate::interval::{bootstrap, middle_90, widen};
 use crate::likelihood::NOISE_FLOOR;
 use crate::locate::Cell;
 use crate::noise::SensorNoise;
+use crate::nominal::Nominal;
 use crate::rival::Rival;
 use crate::separate;
 use crate::split::Split;
 use crate::terms::LackingForce;
 use crate::touch::ContactGap;
 use crate::verdict::closed_fraction;
+use crate::warning::{Warning, check, held_fixed, warnings};
 
 /// The verdict.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -139,6 +142,8 @@ pub struct Report {
     pub retuned: Vec<Retuned>,
     /// Held-out episodes before and after, for plots.
     pub evidence: Evidence,
+    /// What the log's own readings say against it, and what against the answer: to be read first.
+    pub warnings: Vec<Warning>,
     /// Why the verdict is `unknown`.
     pub reason: Option<String>,
     /// Model file that the diagnosis began with.
@@ -165,6 +170,8 @@ pub struct Report {
 
 /// Contacts that differ by less than this factor in their natural frequency are the model's.
 const FACTOR: f64 = 1.5;
+/// A reading that lowers the held-out error to this share is how the log is meant.
+const MENDS: f64 = 0.7;
 /// A number of the log that is this many standard deviations from its mean is wrong, or its spread is.
 const FAR: f64 = 4.0;
 
@@ -240,6 +247,22 @@ impl Report {
         })
     }
 
+    /// Adds what the log's own readings say against it, and numbers given as exact that would explain as much as what was found.
+    pub fn warn(&mut self, log: &Log, nominal: &Nominal) {
+        self.warnings = warnings(log, nominal, &check(log, nominal.tool()), self.seed);
+        if self.verdict != Verdict::None {
+            let errors = [self.heldout.before, self.heldout.after];
+            self.warnings.extend(held_fixed(log, nominal, errors, self.seed));
+        }
+        // What is wrong with a log is no effect, and no experiment tells more before it is mended.
+        let mends = |warning: &Warning| warning.heldout.is_some_and(|[before, after]| after < MENDS * before);
+        if self.warnings.iter().any(mends) {
+            self.next_experiment =
+                "Mend the log first, as \"Check the log\" says, and diagnose it again: `cargo xtask log check LOG --fix COPY` writes a mended copy."
+                    .into();
+        }
+    }
+
     /// What a diagnosis says.
     #[must_use]
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
@@ -256,6 +279,7 @@ impl Report {
             verdict,
             summary,
             reason: diagnosis.reason.clone(),
+            warnings: Vec::new(),
             model: None,
             effects_in_model: diagnosis.effects_in_model.clone(),
             next_experiment: separate::next_experiment(

@@ -8,13 +8,11 @@ use burn::optim::GradientsParams;
 use burn::tensor::activation::{log_softmax, sigmoid};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 
-/// The device that networks live on: burn's ndarray backend on the CPU. Only the weights, Adam and the gradient path `autodiff` use it; the
+/// The device that networks live on: burn's flex backend on the CPU. Only the weights, Adam and the gradient path `autodiff` use it; the
 /// fused path and inference do without burn.
 #[must_use]
 pub fn device() -> Device {
-    #[expect(deprecated, reason = "0.22 is the last burn with the ndarray backend that the project asks for")]
-    let device = Device::ndarray();
-    device
+    Device::flex()
 }
 
 /// LSTM layers and the linear heads of the mixture.

@@ -78,6 +78,7 @@ fn verdict(name: &str, report: &Report, words: &Words) -> Markup {
             p.log { (name) }
             span.{ "badge " (class) } { (words.mark_as(term, badge)) }
             h1 { (report.summary) }
+            @for warning in &report.warnings { p.call { b { "Check the log: " } (warning.sentence) } }
             @if let Some(begun) = begun { (begun) }
             @if let Some(reason) = &report.reason { p.call { "Why unknown: " (reason) "." } }
             @if let Some(description) = &report.description { p.call { "What is left: " (description) "." } }

@@ -72,6 +72,7 @@ fn report(verdict: Verdict) -> Report {
     ];
     let named = verdict == Verdict::Effect;
     Report {
+        warnings: Vec::new(),
         findings: Vec::new(),
         probabilities: probabilities(),
         version: 1,

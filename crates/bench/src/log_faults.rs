@@ -1,0 +1,326 @@
+//! How often `log check` sees what is wrong with a log, and how often it accuses a good one.
+//!
+//! Every good log is spoilt in every way that it can be, one at a time. A fault *can be seen* in a log if the rules of rest, contact and force, at the readings that the
+//! log was spoilt from, tell it from the good log by a margin: a cube's exchanged lengths cannot, nor the sign of a force that was not measured.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context as _, Result};
+use log_check::{Check, Kind, Reading, check};
+use measured_log::{Channel, Log, Readings, Shape};
+use rayon::prelude::*;
+use serde::Serialize;
+use statistics::wilson95;
+
+/// A way to spoil a log.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    /// Its numbers stand for something else: what the reading makes of them.
+    Meant(Reading, Kind),
+    /// All forces and torques read 0.
+    DeadSensor,
+    /// One force is 1000 N.
+    Glitch,
+    /// Times of arrival: up to a third of a period late.
+    Jitter,
+    /// Times 1 % too long.
+    Stretched,
+    /// An episode twice.
+    Repeated,
+    /// Gravity in multiples of g.
+    GravityInG,
+}
+
+/// All, with the names of the table.
+fn faults() -> Vec<(&'static str, Fault)> {
+    use Fault::Meant;
+    let geometry = |reading| Meant(reading, Kind::Geometry);
+    let wrench = |axes| Meant(Reading::Wrench(axes), Kind::WrenchAxes);
+    vec![
+        ("quaternion as its conjugate", geometry(Reading::Conjugate)),
+        ("quaternion as w, x, y, z", geometry(Reading::RealLast)),
+        ("tracker's frame turned by 90°", geometry(Reading::TrackerTurned(1))),
+        ("tracker's frame turned by 180°", geometry(Reading::TrackerTurned(2))),
+        ("object's axes turned by 90°", geometry(Reading::BodyTurned(1))),
+        ("y of the tracker's frame mirrored", geometry(Reading::Mirrored(1))),
+        ("sign of object_y_m", geometry(Reading::PositionMirrored(1))),
+        ("object_x_m and object_y_m exchanged", geometry(Reading::PositionSwapped)),
+        ("object's positions in cm", geometry(Reading::PositionScaled(100.0))),
+        ("object's positions in mm", geometry(Reading::PositionScaled(1000.0))),
+        ("two lengths exchanged", geometry(Reading::LengthsSwapped(0, 1))),
+        ("half lengths for lengths", geometry(Reading::LengthsScaled(0.5))),
+        ("diameter for the cylinder's radius", geometry(Reading::RadiusScaled(2.0))),
+        ("diameter for the tool's radius", geometry(Reading::ToolRadiusScaled(2.0))),
+        ("pose of the lower face", Meant(Reading::OriginAt(1.0), Kind::Height)),
+        ("wrench reversed", wrench([(0, -1), (1, -1), (2, -1)])),
+        ("wrench in a hand's axes, z down", wrench([(0, 1), (1, -1), (2, -1)])),
+        ("wrench turned by 90° about z", wrench([(1, -1), (0, 1), (2, 1)])),
+        ("forces in kilograms-force", Meant(Reading::ForceScaled(1.0 / 9.81), Kind::ForceUnit)),
+        ("forces in millinewtons", Meant(Reading::ForceScaled(1000.0), Kind::ForceUnit)),
+        ("torques about the wrist, 0.12 m above", Meant(Reading::TorqueAbout([0.0, 0.0, 0.12]), Kind::TorquePoint)),
+        ("added mass in grams", Meant(Reading::AddedMassScaled(1000.0), Kind::AddedMass)),
+        ("dead force sensor", Fault::DeadSensor),
+        ("one force of 1000 N", Fault::Glitch),
+        ("times of arrival", Fault::Jitter),
+        ("times 1 % long", Fault::Stretched),
+        ("an episode twice", Fault::Repeated),
+        ("gravity in multiples of g", Fault::GravityInG),
+    ]
+}
+
+/// What was found of a fault.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Row {
+    /// The fault.
+    pub fault: String,
+    /// Logs that were spoilt so.
+    pub logs: usize,
+    /// Logs in which it can be seen.
+    pub visible: usize,
+    /// Of these: in which the kind was suspected.
+    pub caught: usize,
+    /// Of these: in which the first reading that was named mends it.
+    pub mended: usize,
+}
+
+/// The table.
+#[derive(Clone, Debug, Serialize)]
+pub struct Table {
+    /// The logs: last two parts of their folders.
+    pub logs: Vec<String>,
+    /// A row a fault.
+    pub rows: Vec<Row>,
+    /// Good logs that were accused, and of what.
+    pub accused: Vec<(String, Vec<Kind>)>,
+}
+
+/// Spoils every log in every way, and checks it.
+///
+/// # Errors
+///
+/// A folder that holds no log, or one of an arm.
+pub fn run(folders: &[PathBuf]) -> Result<Table> {
+    let read = |folder: &PathBuf| -> Result<(PathBuf, Log)> {
+        let log = measured_log::read(folder)?;
+        let arm = log.header.robot != measured_log::Robot::None;
+        anyhow::ensure!(!arm, "{}: expected a log with robot = \"none\"", folder.display());
+        Ok((folder.clone(), log))
+    };
+    let logs: Vec<(PathBuf, Log)> = folders.iter().map(read).collect::<Result<_>>()?;
+    let good: Vec<Check> = logs.par_iter().map(|(_, log)| check(log, None)).collect();
+    let accused =
+        logs.iter().zip(&good).filter(|(_, check)| !check.suspicions.is_empty()).map(|((folder, _), check)| {
+            (name(folder), check.suspicions.iter().map(|suspicion| suspicion.kind).collect())
+        });
+    let rows = faults().into_iter().map(|(name, fault)| {
+        let tried: Vec<Option<[bool; 3]>> =
+            logs.par_iter().zip(&good).map(|((_, log), good)| one(&fault, log, good)).collect();
+        let count = |index: usize| tried.iter().flatten().filter(|found| found[index]).count();
+        Row {
+            fault: name.into(),
+            logs: tried.iter().flatten().count(),
+            visible: count(0),
+            caught: count(1),
+            mended: count(2),
+        }
+    });
+    Ok(Table {
+        rows: rows.collect(),
+        accused: accused.collect(),
+        logs: folders.iter().map(|folder| name(folder)).collect(),
+    })
+}
+
+fn name(folder: &Path) -> String {
+    let parts: Vec<_> = folder.iter().map(|part| part.to_string_lossy()).collect();
+    parts[parts.len().saturating_sub(2)..].join("/")
+}
+
+/// Whether a fault can be seen in a log, is caught, and mended; `None` where the log cannot be spoilt so.
+fn one(fault: &Fault, log: &Log, good: &Check) -> Option<[bool; 3]> {
+    let (spoilt, kind) = spoil(fault, log)?;
+    let found = check(&spoilt, None);
+    let visible = visible(fault, good, &found);
+    let suspicion = found.suspicions.iter().find(|suspicion| suspicion.kind == kind);
+    let mended = suspicion.is_some_and(|suspicion| {
+        suspicion.readings.first().is_some_and(|reading| near(&check(&reading.apply(&spoilt), None), good))
+    });
+    Some([visible, visible && suspicion.is_some(), visible && mended])
+}
+
+/// Whether a log keeps the rules as well as another.
+fn near(mended: &Check, good: &Check) -> bool {
+    let angle = |check: &Check| check.forces.map_or(1.0, |forces| forces.cosine);
+    mended.fit.cost() < good.fit.cost() + SAME && angle(mended) > angle(good) - SAME
+}
+
+/// What rules may differ by in logs that are the same for them.
+const SAME: f64 = 0.3;
+/// What a fault has to change in the cost of poses, and in the cosine of forces, to be seen.
+const SEEN: f64 = 1.0;
+const SEEN_COSINE: f64 = 0.6;
+
+fn visible(fault: &Fault, good: &Check, spoilt: &Check) -> bool {
+    let rises = spoilt.fit.cost() - good.fit.cost() >= SEEN;
+    let forces = good.forces.filter(|forces| forces.cosine > SEEN_COSINE);
+    match fault {
+        Fault::Meant(Reading::Wrench(_), _) => {
+            forces.is_some_and(|forces| spoilt.forces.is_some_and(|found| forces.cosine - found.cosine > SEEN_COSINE))
+        }
+        // What rolls needs any small force, so that a unit that makes forces smaller is not seen.
+        Fault::Meant(Reading::ForceScaled(factor), _) => {
+            forces.is_some_and(|forces| *factor > 1.0 || (0.5..2.0).contains(&forces.strength))
+        }
+        Fault::Meant(Reading::TorqueAbout(_), _) => forces.is_some() && has(spoilt, "wrist_tx_nm"),
+        Fault::Meant(Reading::AddedMassScaled(_), _) => true,
+        Fault::Meant(..) => rises,
+        Fault::DeadSensor | Fault::Glitch | Fault::Jitter | Fault::Stretched | Fault::Repeated | Fault::GravityInG => {
+            true
+        }
+    }
+}
+
+fn has(check: &Check, column: &str) -> bool {
+    check.sensors.iter().any(|sensor| sensor.column == column)
+}
+
+/// A spoilt log and what it has to be suspected of; `None` where it cannot be spoilt so, or is no valid log then.
+fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
+    let mut spoilt = log.clone();
+    let has = |channel: Channel| log.episodes.iter().any(|episode| episode.channels.contains_key(&channel));
+    let force = Channel::WristForce(measured_log::Axis::X);
+    let kind = match fault {
+        Fault::Meant(reading, kind) => {
+            let shape = &log.header.object.shape;
+            let can = match reading {
+                Reading::Conjugate | Reading::RealLast | Reading::BodyTurned(_) => {
+                    has(Channel::ObjectOrientation(measured_log::Component::W))
+                }
+                Reading::LengthsSwapped(..) => matches!(shape, Shape::Box { .. }),
+                Reading::RadiusScaled(_) => matches!(shape, Shape::Cylinder { .. }),
+                Reading::ToolRadiusScaled(_) => log.header.tool_radius_m.is_some(),
+                Reading::Wrench(_) | Reading::ForceScaled(_) => has(force),
+                Reading::TorqueAbout(_) => has(Channel::WristTorque(measured_log::Axis::X)),
+                Reading::AddedMassScaled(_) => log.episodes.iter().any(|episode| {
+                    episode
+                        .channels
+                        .get(&Channel::AddedMass)
+                        .is_some_and(|cells| cells.iter().flatten().any(|mass| mass > 0.0))
+                }),
+                _ => true,
+            };
+            can.then_some(())?;
+            spoilt = reading.apply(log);
+            *kind
+        }
+        Fault::DeadSensor => {
+            has(force).then_some(())?;
+            change(&mut spoilt, |channel, _, value| {
+                if matches!(channel, Channel::WristForce(_) | Channel::WristTorque(_)) { 0.0 } else { value }
+            });
+            Kind::DeadSensor
+        }
+        Fault::Glitch => {
+            has(force).then_some(())?;
+            let middle = spoilt.episodes.len() / 2;
+            let episode = &mut spoilt.episodes[middle];
+            let cells = episode.channels.get(&force)?;
+            let row = (cells.len() / 2..cells.len()).find(|row| cells.get(*row).is_some())?;
+            let new: Readings =
+                cells.iter().enumerate().map(|(i, value)| if i == row { Some(1000.0) } else { value }).collect();
+            episode.channels.insert(force, new);
+            Kind::Outliers
+        }
+        Fault::Jitter => {
+            let late_secs = 0.33 * log_check::check(log, None).clock?.period_secs;
+            for (number, episode) in spoilt.episodes.iter_mut().enumerate() {
+                for (row, secs) in episode.time_secs.iter_mut().enumerate().skip(1) {
+                    // Without a generator: the fractional parts of a row's multiples of the golden section are uniform.
+                    *secs += late_secs * (0.618_034 * (row + 37 * number) as f64).fract();
+                }
+                let increasing = episode.time_secs.windows(2).all(|pair| pair[0] < pair[1]);
+                increasing.then_some(())?;
+            }
+            Kind::Jitter
+        }
+        Fault::Stretched => {
+            spoilt.episodes.iter_mut().for_each(|episode| episode.time_secs.iter_mut().for_each(|secs| *secs *= 1.01));
+            Kind::Rate
+        }
+        Fault::Repeated => {
+            let mut copy = spoilt.episodes[spoilt.episodes.len() / 2].clone();
+            copy.id = spoilt.episodes.last()?.id + 1;
+            spoilt.episodes.push(copy);
+            Kind::Repeated
+        }
+        Fault::GravityInG => {
+            spoilt.header.gravity_mps2 = 1.0;
+            Kind::Gravity
+        }
+    };
+    spoilt.checked(Path::new("log.toml"), Path::new("samples.csv")).ok()?;
+    Some((spoilt, kind))
+}
+
+fn change(log: &mut Log, new: impl Fn(Channel, usize, f64) -> f64) {
+    for episode in &mut log.episodes {
+        for (channel, cells) in &mut episode.channels {
+            *cells =
+                cells.iter().enumerate().map(|(row, value)| value.map(|value| new(*channel, row, value))).collect();
+        }
+    }
+}
+
+impl Table {
+    /// As Markdown.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let mut text = String::from(
+            "| fault | logs | can be seen | caught (95 %) | mended by the first reading |\n|---|---|---|---|---|\n",
+        );
+        for row in &self.rows {
+            let share = if row.visible == 0 {
+                "–".into()
+            } else {
+                let [low, high] = wilson95(row.caught as u32, row.visible as u32).map(|share| 100.0 * share);
+                format!("{} ({low:.0} to {high:.0} %)", row.caught)
+            };
+            let _ = writeln!(text, "| {} | {} | {} | {share} | {} |", row.fault, row.logs, row.visible, row.mended);
+        }
+        let _ = writeln!(text, "\nOf {} good logs {} are accused.", self.logs.len(), self.accused.len());
+        for (log, kinds) in &self.accused {
+            let _ = writeln!(text, "- {log}: {kinds:?}");
+        }
+        text
+    }
+
+    /// As JSON.
+    ///
+    /// # Errors
+    ///
+    /// None that occurs.
+    pub fn json(&self) -> Result<String> {
+        serde_json::to_string_pretty(self).context("cannot write the table")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_can_be_seen_is_caught_and_good_logs_are_not_accused() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
+        let logs: Vec<PathBuf> = (0..12).map(|i| folder.join(format!("set-{i:03}"))).collect();
+        let table = run(&logs).unwrap();
+        assert!(table.accused.is_empty(), "{:?}", table.accused);
+        for row in &table.rows {
+            assert!(row.visible > 0, "{row:?}");
+            // Where the tool hardly moves, late stamps make no way of it rough.
+            let least = if row.fault == "times of arrival" { 0.5 } else { 0.9 };
+            assert!(row.caught as f64 >= least * row.visible as f64, "{row:?}");
+        }
+        assert!(table.markdown().contains("Of 12 good logs 0 are accused."));
+    }
+}

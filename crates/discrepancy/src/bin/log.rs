@@ -1,0 +1,184 @@
+//! `cargo xtask log check`: what a log's own readings say against it.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use discrepancy::{Error, Nominal, rig_tool, warning};
+use log_check::{Check, Reading, Sensor};
+use measured_log::{Format, Log, Notes};
+use physics_model::robot::check_root;
+use program::typed;
+
+/// Looks at a measured log before anything is concluded from it.
+#[derive(Debug, Parser)]
+#[command(name = "log", version, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Says what is in a log, what looks wrong with units, frames, sizes, clocks and sensors, and what it cannot show.
+    #[command(after_help = EXAMPLES)]
+    Check(Checked),
+}
+
+#[derive(Debug, clap::Args)]
+struct Checked {
+    /// Folder of the log: log.toml with samples.csv or samples.parquet.
+    log: PathBuf,
+    /// Writes a copy in which everything that can be mended is, and says what was done; the folder must not hold a log yet.
+    #[arg(long, value_name = "DIR")]
+    fix: Option<PathBuf>,
+    /// Simulates nothing: skips what held-out episodes say of each other way in which the log may be meant.
+    #[arg(long)]
+    readings_only: bool,
+    /// Ends with exit code 1 if anything looks wrong, for scripts.
+    #[arg(long)]
+    deny: bool,
+    /// Prints the check as one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask log check tests/data/mujoco-logs/logs/set-003
+  cargo xtask log check runs/my-log --fix runs/my-log-mended";
+
+/// Split of the episodes for what is simulated: that of `diagnose` without `--seed`.
+const SEED: u64 = 1;
+
+fn main() -> ExitCode {
+    let Arguments { verb: Verb::Check(options) } = program::parse();
+    let mut denied = false;
+    let done = run(&options).map(|wrong| denied = wrong && options.deny);
+    let code = program::end(done, |error| if let Error::Folder { .. } = error { 1 } else { 2 });
+    if denied { ExitCode::from(1) } else { code }
+}
+
+fn run(options: &Checked) -> Result<bool, Error> {
+    if let Some(root) = &options.root {
+        check_root(root)?;
+    }
+    let log = measured_log::read(&options.log)?;
+    let tool = rig_tool(&log, options.root.as_deref())?;
+    let check = warning::check(&log, &tool);
+    let nominal = Nominal::new(&log.header, tool)?;
+    let sentences: Vec<String> = if options.readings_only {
+        check.suspicions.iter().map(log_check::Suspicion::sentence).collect()
+    } else {
+        warning::warnings(&log, &nominal, &check, SEED).into_iter().map(|warning| warning.sentence).collect()
+    };
+    if options.json {
+        let json = serde_json::to_string_pretty(&check).map_err(|error| Error::Model { reason: error.to_string() })?;
+        program::show(&(json + "\n"));
+    } else {
+        print(&log, &check, &sentences);
+    }
+    if let Some(out) = &options.fix {
+        fix(&log, &check, &options.log, out)?;
+    }
+    Ok(!check.suspicions.is_empty())
+}
+
+fn print(log: &Log, check: &Check, sentences: &[String]) {
+    let rows: usize = log.episodes.iter().map(measured_log::Episode::rows).sum();
+    program::out!("{} episodes, {rows} rows.", log.episodes.len());
+    program::out!(
+        "{:18} {:>9} {:>10} {:>9} {:>10}  range",
+        "sensor, by column",
+        "readings",
+        "a second",
+        "gap, s",
+        "step"
+    );
+    for sensor in &check.sensors {
+        program::out!("{}", line(sensor));
+    }
+    if let Some(clock) = &check.clock {
+        program::out!(
+            "{} comes every {:.3} ms, give or take {:.3} ms; {} gaps.",
+            clock.column,
+            1e3 * clock.period_secs,
+            1e3 * clock.jitter_secs,
+            clock.gaps
+        );
+    }
+    if let Some(touch) = check.fit.touch {
+        program::out!(
+            "The object sets out {} times; the tool then touches it in {:.0} % and is {:.1} mm away in the median.",
+            touch.onsets,
+            100.0 * touch.met,
+            1e3 * touch.distance_m
+        );
+    }
+    if let Some(rest) = check.fit.rest {
+        program::out!(
+            "At rest it leans by {:.1}° and its lowest point is {:.1} mm above the table, in the median of {} episodes.",
+            rest.tilt_rad.to_degrees(),
+            1e3 * rest.height_m,
+            rest.episodes
+        );
+    }
+    if let Some(forces) = check.forces {
+        program::out!(
+            "Forces point {:.0}° away from the way out of the object and are {:.2} times friction · weight, in the median of {} episodes.",
+            forces.cosine.clamp(-1.0, 1.0).acos().to_degrees(),
+            forces.strength,
+            forces.episodes
+        );
+    }
+    for sentence in sentences {
+        program::out!("Wrong? {sentence}");
+    }
+    if sentences.is_empty() {
+        program::out!("Nothing looks wrong.");
+    }
+    for what in &check.not_told {
+        program::out!("This log does not tell {what}.");
+    }
+}
+
+fn line(sensor: &Sensor) -> String {
+    let number = |value: Option<f64>| value.map_or_else(|| "–".into(), |value| format!("{value:.4}"));
+    format!(
+        "{:18} {:>9} {:>10} {:>9.3} {:>10}  {:.4} to {:.4}",
+        sensor.column,
+        sensor.read,
+        sensor.rate_hz.map_or_else(|| "–".into(), |rate| format!("{rate:.1}")),
+        sensor.longest_gap_secs,
+        number(sensor.smallest_step),
+        sensor.range[0],
+        sensor.range[1]
+    )
+}
+
+/// Writes the log as it may be meant.
+fn fix(log: &Log, check: &Check, source: &Path, out: &Path) -> Result<(), Error> {
+    let readings: Vec<&Reading> = check.suspicions.iter().filter_map(|suspicion| suspicion.readings.first()).collect();
+    let mut mended = readings.iter().fold(log.clone(), |log, reading| reading.apply(&log));
+    let mut done: Vec<String> = readings.iter().map(|reading| reading.words()).collect();
+    if let Some(alive) = log_check::without_dead(&mended) {
+        mended = alive;
+        done.push("without the columns of dead sensors".into());
+    }
+    if done.is_empty() {
+        program::say!("nothing of it can be mended here: no copy was written");
+        return Ok(());
+    }
+    let mut notes = Notes::new();
+    notes.insert("", format!("A copy of {}, {}.", source.display(), done.join(", ")));
+    measured_log::write(out, &mended, Format::Csv, &notes)?;
+    done.iter().for_each(|words| program::say!("{}: {words}", typed(out)));
+    program::next(&[(
+        ["cargo", "xtask", "diagnose", "--measured", &typed(out)].map(String::from).to_vec(),
+        "diagnoses the mended copy",
+    )]);
+    Ok(())
+}

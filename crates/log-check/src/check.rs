@@ -1,0 +1,301 @@
+//! The check of a log.
+
+use measured_log::{Channel, Log, Shape};
+use nalgebra::Vector3;
+use physics_model::robot::{Robot, ToolShape};
+use serde::Serialize;
+
+use crate::arm::{self, capital};
+use crate::geometry::{self, Fit, Tool};
+use crate::motion::Motions;
+use crate::sensors::{self, Clock, Sensor};
+use crate::suspicion::{Kind, Suspicion};
+use crate::wrench::{self, Contacts, Forces, Lever};
+use crate::{Reading, shape::Solid};
+
+/// What another reading has to lower the cost of a log by to be suspected, in units of [`Fit::cost`]. Chosen on simulated logs of four engines (seed 11) and their
+/// corruptions; of good logs there none gains more than 0.75.
+const GAIN: f64 = 1.0;
+/// Cost above which a rule is broken.
+const BROKEN: f64 = 0.5;
+/// Readings within this of the best are as good.
+const AS_GOOD: f64 = 0.1;
+/// What the mean cosine of force and way out has to rise by, and to be at least; and in its standard errors.
+const COSINE_GAIN: f64 = 0.5;
+const LEAST_COSINE: f64 = 0.6;
+const COSINE_ERRORS: f64 = 4.0;
+/// Forces of pushes are friction · weight within this factor; what rolls needs less.
+const STRENGTH: f64 = 5.0;
+/// A torque's lever beyond the tool's own reach, m, and the share of torques that it has to explain.
+const LEVER_M: f64 = 0.02;
+const LEVER_EXPLAINED: f64 = 0.8;
+/// Share of onsets at which tool and object have to meet if no reading mends it.
+const LEAST_MET: f64 = 0.25;
+/// A known weight that is this many times the object's is asked about.
+const HEAVY: f64 = 20.0;
+/// Gravity at sea level, from the equator to the poles with a margin for heights, m/s².
+const GRAVITY_MPS2: [f64; 2] = [9.76, 9.84];
+
+/// What a log's own readings say.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Check {
+    /// Its sensors.
+    pub sensors: Vec<Sensor>,
+    /// When rows come.
+    pub clock: Option<Clock>,
+    /// How well poses and sizes fit together.
+    pub fit: Fit,
+    /// What forces show.
+    pub forces: Option<Forces>,
+    /// What looks wrong.
+    pub suspicions: Vec<Suspicion>,
+    /// What this log cannot show.
+    pub not_told: Vec<String>,
+}
+
+/// Checks a log. `arm`: the arm whose tool and joints it has.
+#[must_use]
+pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
+    let sensors = sensors::sensors(log);
+    let clock = sensors::clock(log);
+    let mut suspicions = header(log);
+    suspicions.extend(arm.and_then(|arm| arm::suspicion(log, arm)));
+    let tool = tool(log, arm);
+    let width_m = 2.0 * Solid::new(&log.header.object.shape).half_m().into_iter().fold(f64::INFINITY, f64::min);
+    let motions = Motions::new(log, width_m, |episode, row| arm::tool_m(log, arm, episode, row));
+    let fit = geometry::fit(None, log, &tool, &motions);
+    let (geometry, mut not_told) = of_geometry(log, &tool, &motions, &fit);
+    let meant = geometry.as_ref().and_then(|suspicion| suspicion.readings.first().copied());
+    suspicions.extend(sensors::suspicions(log, &sensors, clock.as_ref(), &|index, secs| motions.sets_out(index, secs)));
+    suspicions.extend(geometry);
+    let contacts = Contacts::new(meant.as_ref(), log, &tool, &motions);
+    let forces = contacts.forces(None);
+    let reach_m = tool.balls.iter().map(|(at, radius_m)| Vector3::from(*at).norm() + radius_m).fold(0.0, f64::max);
+    let axes = of_axes(&contacts, forces);
+    let turned = axes.is_some();
+    suspicions.extend(axes);
+    suspicions.extend(of_strength(forces, motions.may_roll(&log.header.object.shape)));
+    if !turned {
+        suspicions.extend(contacts.lever().and_then(|lever| of_lever(lever, reach_m)));
+    }
+    if forces.is_none() && has(log, Channel::WristForce(measured_log::Axis::X)) {
+        not_told.push(
+            "sign, axes and unit of the wrench: too few readings of forces where tool and object are known to touch"
+                .into(),
+        );
+    }
+    suspicions.sort_by_key(|suspicion| suspicion.kind);
+    Check { sensors, clock, fit, forces, suspicions, not_told }
+}
+
+fn has(log: &Log, channel: Channel) -> bool {
+    log.episodes.first().is_some_and(|episode| episode.channels.contains_key(&channel))
+}
+
+/// What touches: the ball of the log, or what of the hand can touch.
+fn tool(log: &Log, arm: Option<&Robot>) -> Tool {
+    let Some(arm) = arm else {
+        return Tool { balls: log.header.tool_radius_m.map(|radius_m| ([0.0; 3], radius_m)).into_iter().collect() };
+    };
+    let turn = arm.tool_orientation();
+    let placed = |at: [f64; 3]| -> [f64; 3] { (turn * Vector3::from(at)).into() };
+    let balls = arm.tool_shapes().iter().flat_map(|shape| match *shape {
+        ToolShape::Ball { center_m, radius_m } => vec![(placed(center_m), radius_m)],
+        ToolShape::Capsule { a_m, b_m, radius_m } => {
+            let along = |share: f64| std::array::from_fn(|i| a_m[i] + share * (b_m[i] - a_m[i]));
+            (0..=8).map(|step| (placed(along(f64::from(step) / 8.0)), radius_m)).collect()
+        }
+    });
+    Tool { balls: balls.collect() }
+}
+
+/// Numbers of the header that are asked about.
+fn header(log: &Log) -> Vec<Suspicion> {
+    let mut all = Vec::new();
+    let gravity = log.header.gravity_mps2;
+    if !(GRAVITY_MPS2[0]..=GRAVITY_MPS2[1]).contains(&gravity) {
+        let found = format!("gravity_mps2 = {gravity}: on Earth it is 9.76 to 9.84.");
+        all.push(Suspicion::new(Kind::Gravity, found, "It is in m/s², not in multiples of g."));
+    }
+    let heaviest = log.episodes.iter().filter_map(|episode| {
+        let cells = episode.channels.get(&Channel::AddedMass)?;
+        Some((cells.iter().flatten().fold(0.0, f64::max), episode.id))
+    });
+    let mass_kg = log.header.object.mass_kg.mean();
+    if let Some((added_kg, episode)) = heaviest.max_by(|a, b| a.0.total_cmp(&b.0))
+        && added_kg > HEAVY * mass_kg
+    {
+        let found = format!("added_mass_kg is {added_kg} in episode {episode}, on an object of {mass_kg} kg.");
+        let mut suspicion =
+            Suspicion::new(Kind::AddedMass, found, "It is in kg; grams would have to be divided by 1000.");
+        suspicion.readings.push(Reading::AddedMassScaled(1e-3));
+        all.push(suspicion);
+    }
+    all
+}
+
+/// What poses and sizes show, and what they cannot.
+fn of_geometry(log: &Log, tool: &Tool, motions: &Motions, own: &Fit) -> (Option<Suspicion>, Vec<String>) {
+    let mut candidates = geometry::readings(&log.header.object.shape, motions.turns);
+    if let Some(rest) = own.rest {
+        candidates.push(Reading::TableAt(log.header.table.height_m.mean() + rest.height_m));
+    }
+    let mut fits: Vec<(Reading, Fit)> =
+        candidates.into_iter().map(|reading| (reading, geometry::fit(Some(&reading), log, tool, motions))).collect();
+    let same = |(reading, fit): &&(Reading, Fit)| {
+        (fit.cost() - own.cost()).abs() < AS_GOOD && !matches!(reading, Reading::TableAt(_))
+    };
+    let same: Vec<Reading> = fits.iter().filter(same).map(|(reading, _)| *reading).collect();
+    let not_told = not_told(log, own, motions, &same);
+    // A stable sort: of readings that are as good, the commonest mistake comes first.
+    fits.sort_by(|a, b| a.1.cost().total_cmp(&b.1.cost()));
+    let best = fits.first().map_or(own.cost(), |(_, fit)| fit.cost());
+    if own.cost() - best < GAIN {
+        return (lost(own), not_told);
+    }
+    let good: Vec<&(Reading, Fit)> = fits.iter().filter(|(_, fit)| fit.cost() < best + AS_GOOD).collect();
+    let raised = good.iter().all(|(reading, _)| matches!(reading, Reading::TableAt(_) | Reading::OriginAt(_)));
+    let found = match (own.rest, own.touch) {
+        (Some(rest), _) if raised => format!(
+            "At rest the object's lowest point is {:.1} mm {} the table.",
+            1e3 * rest.height_m.abs(),
+            if rest.height_m > 0.0 { "above" } else { "below" }
+        ),
+        (rest, touch) => broken(rest, touch),
+    };
+    let ways: Vec<String> = good.iter().take(3).map(|(reading, _)| reading.words()).collect();
+    let then = good.first().and_then(|(_, fit)| fit.touch).filter(|_| !raised);
+    let after = then
+        .map(|touch| format!(": the tool then touches it in {:.0} % of the times that it sets out", 100.0 * touch.met));
+    let mend = format!("It fits {}{}.", ways.join(", or "), after.unwrap_or_default());
+    let mut suspicion = Suspicion::new(if raised { Kind::Height } else { Kind::Geometry }, found, &mend);
+    suspicion.readings = good.iter().map(|(reading, _)| *reading).collect();
+    suspicion.shown_at = motions.episodes.iter().find_map(|episode| {
+        let seen = &episode.seen[*episode.onsets.first()?];
+        Some((episode.id, seen.secs))
+    });
+    (Some(suspicion), not_told)
+}
+
+/// What rest and contact break, with numbers.
+fn broken(rest: Option<geometry::Rest>, touch: Option<geometry::Touch>) -> String {
+    let mut parts = Vec::new();
+    if let Some(touch) = touch {
+        let mm = 1e3 * touch.distance_m;
+        let place = if mm < 0.0 { format!("{:.1} mm inside it", -mm) } else { format!("{mm:.1} mm away from it") };
+        parts.push(format!(
+            "where the object sets out ({} times) the tool touches it in {:.0} % of cases and is {place} in the median",
+            touch.onsets,
+            100.0 * touch.met
+        ));
+    }
+    if let Some(rest) = rest.filter(|rest| rest.cost > BROKEN || touch.is_none()) {
+        parts.push(format!(
+            "at rest the object leans by {:.0}° from its nearest face, and its lowest point is {:.1} mm from the table",
+            rest.tilt_rad.to_degrees(),
+            1e3 * rest.height_m
+        ));
+    }
+    format!("Object, tool and table do not fit together: {}.", parts.join("; "))
+}
+
+/// A log whose tool is not where the object sets out, and that no reading mends.
+fn lost(own: &Fit) -> Option<Suspicion> {
+    let touch = own.touch.filter(|touch| touch.met < LEAST_MET)?;
+    let mend =
+        "No usual mistake explains it. Check frames, clocks, sizes, and whether something else moves the object.";
+    Some(Suspicion::new(Kind::Geometry, broken(own.rest, Some(touch)), mend))
+}
+
+/// What poses and sizes cannot show in this log; `same`: readings that change nothing.
+fn not_told(log: &Log, own: &Fit, motions: &Motions, same: &[Reading]) -> Vec<String> {
+    let mut all = Vec::new();
+    if own.touch.is_none() {
+        all.push("frames and sizes: too few moments at which the object sets out beside a tool".into());
+    } else {
+        let words: Vec<String> =
+            same.iter().map(|reading| reading.words().trim_start_matches("with ").to_owned()).collect();
+        if !words.is_empty() {
+            all.push(format!("these readings, which fit as well: {}", words.join("; ")));
+        }
+    }
+    if !motions.turns && !matches!(log.header.object.shape, Shape::Sphere { .. }) {
+        all.push("how the object is turned: it was not measured".into());
+    }
+    all
+}
+
+fn of_axes(contacts: &Contacts, own: Option<Forces>) -> Option<Suspicion> {
+    let own = own?;
+    let mut all: Vec<(Reading, Forces)> =
+        wrench::axes().into_iter().filter_map(|reading| Some((reading, contacts.forces(Some(&reading))?))).collect();
+    let best = all.iter().map(|(_, forces)| forces.cosine).fold(f64::NEG_INFINITY, f64::max);
+    let error = own.error.hypot(all.iter().find(|(_, forces)| forces.cosine == best)?.1.error);
+    if best - own.cosine < COSINE_GAIN.max(COSINE_ERRORS * error) || best < LEAST_COSINE {
+        return None;
+    }
+    // The order is that of how common they are.
+    all.retain(|(_, forces)| forces.cosine > best - 0.02);
+    let angle = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    let found = format!(
+        "Forces on the tool point {:.0}° away from where the object would push it, in {} episodes with contact.",
+        angle(own.cosine),
+        own.episodes
+    );
+    let ways: Vec<String> = all.iter().take(3).map(|(reading, _)| reading.words()).collect();
+    let mend = format!("It is {:.0}° {}.", angle(all.first()?.1.cosine), ways.join(", or "));
+    let mut suspicion = Suspicion::new(Kind::WrenchAxes, found, &mend);
+    suspicion.readings = all.into_iter().map(|(reading, _)| reading).collect();
+    Some(suspicion)
+}
+
+/// `rolls`: what rolls is pushed with any small force.
+fn of_strength(forces: Option<Forces>, rolls: bool) -> Option<Suspicion> {
+    let strength = forces?.strength;
+    if strength < STRENGTH && (rolls || strength > STRENGTH.recip()) {
+        return None;
+    }
+    const FACTORS: [(f64, &str); 5] = [
+        (9.81, "kilograms-force"),
+        (4.448, "pounds-force"),
+        (1e-3, "millinewtons"),
+        (1e3, "kilonewtons"),
+        (0.01, "hundredths of a newton"),
+    ];
+    let off = |factor: &f64| (factor * strength).ln().abs();
+    let (factor, unit) = FACTORS.into_iter().min_by(|a, b| off(&a.0).total_cmp(&off(&b.0)))?;
+    let found = format!(
+        "Pushes take {strength:.2} times the friction of the object on the table, by its mass, friction and gravity."
+    );
+    let mend = if off(&factor) < 0.5 * off(&1.0) {
+        format!("Are forces in {unit}? Else check mass, added mass and friction.")
+    } else {
+        "Check the unit of forces, mass, added mass and friction.".into()
+    };
+    let mut suspicion = Suspicion::new(Kind::ForceUnit, found, &mend);
+    suspicion.readings.extend((off(&factor) < 0.5 * off(&1.0)).then_some(Reading::ForceScaled(factor)));
+    Some(suspicion)
+}
+
+fn of_lever(lever: Lever, reach_m: f64) -> Option<Suspicion> {
+    if lever.explained < LEVER_EXPLAINED || lever.length_m < reach_m + LEVER_M {
+        return None;
+    }
+    let [x, y, z] = lever.at_m.map(|at| -at);
+    let found = format!(
+        "Torques are {:.0} mm times the force, the tool reaches {:.0} mm from its centre.",
+        1e3 * lever.length_m,
+        1e3 * reach_m
+    );
+    let far = lever.length_m > 10.0 * (reach_m + LEVER_M);
+    let (mend, reading) = if far {
+        ("Are they in N·mm?".into(), Reading::TorqueScaled(1e-3))
+    } else {
+        let mend =
+            format!("They are about a point at ({x:.3}, {y:.3}, {z:.3}) m from the tool's centre, such as the wrist.");
+        (mend, Reading::TorqueAbout(lever.at_m))
+    };
+    let mut suspicion = Suspicion::new(Kind::TorquePoint, found, &capital(&mend));
+    suspicion.readings.push(reading);
+    Some(suspicion)
+}

@@ -1,0 +1,163 @@
+//! A log as places and turns: what the checks look at.
+
+use measured_log::{Axis, Channel, Episode, Log, Shape};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+/// What has not moved in so many readings, and for so long, rests: what slides freely does not.
+const REST_ROWS: usize = 5;
+const REST_SECS: f64 = 0.15;
+/// What a pose has to move by at rest, in scatters of its readings, to have set out.
+const SIGMAS: f64 = 6.0;
+/// And in itself: m for each metre of the object, and rad.
+const LEAST_SHARE: f64 = 0.015;
+const LEAST_RAD: f64 = 0.02;
+
+/// A row with a whole pose of the object.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// Row in its episode.
+    pub(crate) row: usize,
+    /// Since the episode began, s.
+    pub(crate) secs: f64,
+    /// Where the object was read to be; without turn where the log has none.
+    pub(crate) pose: Isometry3<f64>,
+    /// Tool centre, by interpolation where it was read in other rows.
+    pub(crate) tool: Option<Vector3<f64>>,
+}
+
+/// An episode.
+#[derive(Clone, Debug)]
+pub(crate) struct Motion {
+    /// Its number.
+    pub(crate) id: u64,
+    pub(crate) seen: Vec<Seen>,
+    /// Indices in `seen` at which the object sets out from rest.
+    pub(crate) onsets: Vec<usize>,
+    /// Indices in `seen` at which it rests.
+    pub(crate) rests: Vec<usize>,
+}
+
+/// All episodes, and how far the object's readings scatter.
+#[derive(Clone, Debug)]
+pub(crate) struct Motions {
+    pub(crate) episodes: Vec<Motion>,
+    /// Of a coordinate of the position, m.
+    pub(crate) position_m: f64,
+    /// Whether turns of the object were read.
+    pub(crate) turns: bool,
+}
+
+impl Motions {
+    /// Of a log whose object is `size_m` wide. `tool` gives the tool centre of a row.
+    pub(crate) fn new(log: &Log, size_m: f64, tool: impl Fn(&Episode, usize) -> Option<[f64; 3]>) -> Self {
+        let has = |c: Channel| log.episodes.first().is_some_and(|episode| episode.channels.contains_key(&c));
+        let turns = has(Channel::ObjectOrientation(measured_log::Component::W));
+        let all: Vec<(u64, Vec<Seen>)> =
+            log.episodes.iter().map(|episode| (episode.id, seen(episode, turns, &tool))).collect();
+        let steps = |size: fn(&Seen, &Seen) -> f64| {
+            let steps = all.iter().flat_map(|(_, seen)| seen.windows(2).map(move |two| size(&two[0], &two[1])));
+            scatter(steps.collect())
+        };
+        let position_m = steps(|a, b| (b.pose.translation.vector - a.pose.translation.vector).norm());
+        let turn_rad = steps(|a, b| a.pose.rotation.angle_to(&b.pose.rotation));
+        let far = [(SIGMAS * position_m).max(LEAST_SHARE * size_m), (SIGMAS * turn_rad).max(LEAST_RAD)];
+        let episodes = all
+            .into_iter()
+            .map(|(id, seen)| {
+                let (onsets, rests) = onsets(&seen, far);
+                Motion { id, seen, onsets, rests }
+            })
+            .collect();
+        Self { episodes, position_m, turns }
+    }
+
+    /// Whether the object sets out in an episode, by its index, about a time, s.
+    pub(crate) fn sets_out(&self, index: usize, secs: f64) -> bool {
+        const ABOUT_SECS: f64 = 0.1;
+        let motion = &self.episodes[index];
+        motion.onsets.iter().any(|onset| (motion.seen[*onset].secs - secs).abs() < ABOUT_SECS)
+    }
+
+    /// Whether the object is a ball, or a cylinder that is seen to lie, or not seen to stand.
+    pub(crate) fn may_roll(&self, shape: &Shape) -> bool {
+        let lies = |seen: &Seen| (seen.pose.rotation * Vector3::z()).z.abs() < 0.7;
+        match shape {
+            Shape::Sphere { .. } => true,
+            Shape::Cylinder { .. } => !self.turns || self.episodes.iter().flat_map(|motion| &motion.seen).any(lies),
+            Shape::Box { .. } | Shape::Prism { .. } => false,
+        }
+    }
+}
+
+/// Standard deviation of a component of readings of which these are the steps' lengths: the lower quartile, which motion leaves alone.
+fn scatter(mut lengths: Vec<f64>) -> f64 {
+    lengths.retain(|length| *length > 0.0);
+    lengths.sort_by(f64::total_cmp);
+    // Of a vector of three normal differences the lower quartile of the length is 1.10 √2 standard deviations.
+    lengths.get(lengths.len() / 4).map_or(0.0, |length| length / (1.10 * std::f64::consts::SQRT_2))
+}
+
+/// The rotation of a quaternion x, y, z, w.
+pub(crate) fn rotation([x, y, z, w]: [f64; 4]) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z))
+}
+
+fn seen(episode: &Episode, turns: bool, tool: impl Fn(&Episode, usize) -> Option<[f64; 3]>) -> Vec<Seen> {
+    let tools: Vec<(f64, Vector3<f64>)> = (0..episode.rows())
+        .filter_map(|row| Some((episode.time_secs[row], Vector3::from(tool(episode, row)?))))
+        .collect();
+    (0..episode.rows())
+        .filter_map(|row| {
+            let place = Vector3::from(episode.vector(Channel::ObjectPosition, row)?);
+            let turn = if turns { rotation(episode.orientation(row)?) } else { UnitQuaternion::identity() };
+            let secs = episode.time_secs[row];
+            let pose = Isometry3::from_parts(Translation3::from(place), turn);
+            Some(Seen { row, secs, pose, tool: at(&tools, secs) })
+        })
+        .collect()
+}
+
+/// A path at a time, between its points; `None` before and after it.
+fn at(path: &[(f64, Vector3<f64>)], secs: f64) -> Option<Vector3<f64>> {
+    let after = path.partition_point(|(time, _)| *time < secs);
+    let next = path.get(after)?;
+    if next.0 == secs || after == 0 {
+        return (next.0 == secs).then_some(next.1);
+    }
+    let last = path[after - 1];
+    Some(last.1.lerp(&next.1, (secs - last.0) / (next.0 - last.0)))
+}
+
+/// Where a path of poses leaves rest, and where it rests.
+fn onsets(seen: &[Seen], far: [f64; 2]) -> (Vec<usize>, Vec<usize>) {
+    let away = |a: usize, b: usize| {
+        let (a, b) = (&seen[a].pose, &seen[b].pose);
+        (a.translation.vector - b.translation.vector).norm() > far[0] || a.rotation.angle_to(&b.rotation) > far[1]
+    };
+    let rested = |since: usize, now: usize| now - since >= REST_ROWS && seen[now].secs - seen[since].secs >= REST_SECS;
+    let (mut onsets, mut rests) = (Vec::new(), Vec::new());
+    // The first of the readings that have been near each other since.
+    let mut since = 0;
+    for now in 1..seen.len() {
+        if !away(since, now) {
+            if rested(since, now) {
+                rests.push(now);
+            }
+            continue;
+        }
+        // One reading alone may be an outlier.
+        if seen.get(now + 1).is_some() && !away(since, now + 1) {
+            continue;
+        }
+        if rested(since, now) {
+            onsets.push(now);
+        }
+        since = now;
+    }
+    (onsets, rests)
+}
+
+/// The three components of a channel in a row.
+pub(crate) fn vector(episode: &Episode, make: fn(Axis) -> Channel, row: usize) -> Option<Vector3<f64>> {
+    episode.vector(make, row).map(Vector3::from)
+}

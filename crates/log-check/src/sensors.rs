@@ -1,0 +1,367 @@
+//! What each sensor reads, and when.
+
+use measured_log::{Axis, Channel, Component, Episode, Log};
+use serde::Serialize;
+
+use crate::suspicion::{Kind, Suspicion};
+
+/// Rows after which a sensor that never changes is dead, if others do.
+const DEAD_ROWS: usize = 50;
+/// A spike is this many times larger than what its neighbours, and nine in ten of all readings, differ from each other by.
+const SPIKE: f64 = 8.0;
+/// A force is beyond what contacts do if it is so many times larger than all others but a few.
+const BEYOND: f64 = 10.0;
+const FEW: usize = 10;
+/// Rows that an episode has at least if it can be a copy.
+const COPY_ROWS: usize = 10;
+/// Rates may differ by this share from the header's.
+const RATE_SHARE: f64 = 0.004;
+/// A sensor whose rate differs by more than this has one of its own.
+const NEAR_RATE: f64 = 0.15;
+/// Distances of rows that scatter by this share may be those of arrival: if motion is so many times smoother by the number of the row.
+const JITTER_SHARE: f64 = 0.05;
+const SMOOTHER: f64 = 1.5;
+
+/// A sensor: columns that belong together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sensor {
+    /// Name of its first column.
+    pub column: String,
+    /// Rows in which it was read.
+    pub read: usize,
+    /// Rows of the log.
+    pub rows: usize,
+    /// Readings a second, in the median of the distances between them.
+    pub rate_hz: Option<f64>,
+    /// Longest time without a reading between two of an episode, s.
+    pub longest_gap_secs: f64,
+    /// Smallest step between readings that follow each other: the resolution, in the column's unit.
+    pub smallest_step: Option<f64>,
+    /// Smallest and largest reading of its columns.
+    pub range: [f64; 2],
+}
+
+/// When a sensor is read.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Clock {
+    /// Its first column.
+    pub column: String,
+    /// Mean distance between readings, lost ones counted, s.
+    pub period_secs: f64,
+    /// Standard error of it, s.
+    pub error_secs: f64,
+    /// Standard deviation of the distances, s.
+    pub jitter_secs: f64,
+    /// Distances in which readings were lost.
+    pub gaps: usize,
+}
+
+/// Groups of columns that a sensor gives together.
+fn groups(log: &Log) -> Vec<Vec<Channel>> {
+    let vector = |make: fn(Axis) -> Channel| Axis::ALL.map(make).to_vec();
+    let joints = |make: fn(u8) -> Channel| (0..log.header.robot.joints()).map(make).collect::<Vec<_>>();
+    let all = vec![
+        vector(Channel::Command),
+        vector(Channel::Tool),
+        joints(Channel::Joint),
+        vector(Channel::WristForce),
+        vector(Channel::WristTorque),
+        joints(Channel::JointTorque),
+        vector(Channel::ObjectPosition),
+        Component::ALL.map(Channel::ObjectOrientation).to_vec(),
+        vector(Channel::ObjectVelocity),
+        vector(Channel::ObjectSpin),
+        vec![Channel::AddedMass],
+    ];
+    let has = |group: &Vec<Channel>| {
+        group.first().is_some_and(|c| log.episodes.first().is_some_and(|episode| episode.channels.contains_key(c)))
+    };
+    all.into_iter().filter(has).collect()
+}
+
+/// Readings of a column with the indices of their rows.
+fn readings(episode: &Episode, channel: Channel) -> impl Iterator<Item = (usize, f64)> + '_ {
+    episode
+        .channels
+        .get(&channel)
+        .into_iter()
+        .flat_map(|cells| cells.iter().enumerate().filter_map(|(row, value)| Some((row, value?))))
+}
+
+/// All sensors of a log.
+pub(crate) fn sensors(log: &Log) -> Vec<Sensor> {
+    groups(log).into_iter().map(|group| sensor(log, &group)).collect()
+}
+
+fn sensor(log: &Log, group: &[Channel]) -> Sensor {
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    let (mut read, mut gaps, mut smallest) = (0, Vec::new(), f64::INFINITY);
+    for episode in &log.episodes {
+        for (index, channel) in group.iter().enumerate() {
+            let all: Vec<(usize, f64)> = readings(episode, *channel).collect();
+            for (_, value) in &all {
+                range = [range[0].min(*value), range[1].max(*value)];
+            }
+            for pair in all.windows(2) {
+                let step = (pair[1].1 - pair[0].1).abs();
+                smallest = if step > 0.0 { smallest.min(step) } else { smallest };
+            }
+            if index == 0 {
+                read += all.len();
+                gaps.extend(all.windows(2).map(|pair| episode.time_secs[pair[1].0] - episode.time_secs[pair[0].0]));
+            }
+        }
+    }
+    let longest_gap_secs = gaps.iter().copied().fold(0.0, f64::max);
+    Sensor {
+        column: group[0].name(),
+        read,
+        rows: log.episodes.iter().map(Episode::rows).sum(),
+        rate_hz: statistics::quantile(&mut gaps, 0.5).map(f64::recip),
+        longest_gap_secs,
+        smallest_step: smallest.is_finite().then_some(smallest),
+        range: if range[0] <= range[1] { range } else { [0.0; 2] },
+    }
+}
+
+/// When rows come, by the sensor that comes nearest to the header's period; `None` where no sensor was read twice in an episode.
+pub(crate) fn clock(log: &Log) -> Option<Clock> {
+    let sensed = groups(log).into_iter().filter(|group| group[0] != Channel::AddedMass);
+    let clocks = sensed.filter_map(|group| sensor_clock(log, group[0]));
+    let off = |clock: &Clock| (clock.period_secs / log.header.period_secs).ln().abs();
+    clocks.min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
+fn sensor_clock(log: &Log, channel: Channel) -> Option<Clock> {
+    let of_episode = |episode: &Episode| -> Vec<f64> {
+        let times: Vec<f64> = readings(episode, channel).map(|(row, _)| episode.time_secs[row]).collect();
+        times.windows(2).map(|pair| pair[1] - pair[0]).collect()
+    };
+    let mut steps: Vec<f64> = log.episodes.iter().flat_map(of_episode).collect();
+    let median = statistics::quantile(&mut steps, 0.5)?;
+    // Whole numbers of readings, some of which were lost: without these the mean is not that of the sensor.
+    let (mut secs, mut count, mut squares, mut whole) = (0.0, 0.0, 0.0, 0_u32);
+    for step in &steps {
+        let ticks = (step / median).round().max(1.0);
+        secs += step;
+        count += ticks;
+        if ticks == 1.0 {
+            squares += (step - median).powi(2);
+            whole += 1;
+        }
+    }
+    let period_secs = secs / count;
+    let jitter_secs = (squares / f64::from(whole.max(1))).sqrt();
+    Some(Clock {
+        column: channel.name(),
+        period_secs,
+        error_secs: jitter_secs / (steps.len() as f64).sqrt(),
+        jitter_secs,
+        gaps: steps.len() - whole as usize,
+    })
+}
+
+/// What looks wrong with rows and sensors.
+pub(crate) fn suspicions(
+    log: &Log,
+    sensors: &[Sensor],
+    clock: Option<&Clock>,
+    blow: &dyn Fn(usize, f64) -> bool,
+) -> Vec<Suspicion> {
+    let mut all: Vec<Suspicion> = dead(log).into_iter().map(|group| {
+        let column = group[0].name();
+        let value = sensors.iter().find(|sensor| sensor.column == column).map_or(0.0, |sensor| sensor.range[0]);
+        Suspicion::new(
+            Kind::DeadSensor,
+            format!("{column} and its neighbours read exactly {value} in all rows: the sensor is dead or was not connected."),
+            "Take these columns out; a diagnosis leaves them out.",
+        )
+    }).collect();
+    all.extend(clock.and_then(|clock| of_clock(log, clock)));
+    all.extend(groups(log).iter().filter_map(|group| spikes(log, group, blow)));
+    all.extend(repeated(log));
+    all
+}
+
+fn of_clock(log: &Log, clock: &Clock) -> Option<Suspicion> {
+    let period_secs = log.header.period_secs;
+    let ms = |secs: f64| 1e3 * secs;
+    if clock.jitter_secs > JITTER_SHARE * clock.period_secs
+        && let Some(smoother) = evenly(log).filter(|smoother| *smoother > SMOOTHER)
+    {
+        let found = format!(
+            "Readings come every {:.2} ms, give or take {:.2} ms, and motion is {smoother:.1} times smoother if they were read at equal distances: times are those of \
+             arrival, not of measurement.",
+            ms(clock.period_secs),
+            ms(clock.jitter_secs)
+        );
+        return Some(Suspicion::new(
+            Kind::Jitter,
+            found,
+            "Use the sensors' own stamps, or the number of the row times period_secs.",
+        ));
+    }
+    let off = clock.period_secs / period_secs;
+    // Several readings a tick, and several ticks a reading, are allowed.
+    let whole = if off > 1.0 { off / off.round() } else { off * off.recip().round() };
+    let margin = RATE_SHARE + 4.0 * clock.error_secs / clock.period_secs;
+    ((whole - 1.0).abs() > margin && (off - 1.0).abs() < NEAR_RATE).then(|| {
+        let found = format!(
+            "{} comes every {:.3} ms, period_secs says {:.3} ms, and no sensor comes nearer.",
+            clock.column,
+            ms(clock.period_secs),
+            ms(period_secs)
+        );
+        Suspicion::new(Kind::Rate, found, "Check which of the two is right.")
+    })
+}
+
+/// How many times smoother the tool, else the object, moves by the number of its reading than by its time: the median distance of a place from the line between
+/// its neighbours, where these are apart.
+fn evenly(log: &Log) -> Option<f64> {
+    let has = |c: Channel| log.episodes.first().is_some_and(|episode| episode.channels.contains_key(&c));
+    let place: fn(Axis) -> Channel = if has(Channel::Tool(Axis::X)) { Channel::Tool } else { Channel::ObjectPosition };
+    let (mut ways, mut by_time, mut by_row) = (Vec::new(), Vec::new(), Vec::new());
+    for episode in &log.episodes {
+        let read: Vec<(f64, [f64; 3])> =
+            (0..episode.rows()).filter_map(|row| Some((episode.time_secs[row], episode.vector(place, row)?))).collect();
+        for three in read.windows(3) {
+            let off = |share: f64| -> f64 {
+                let line = |i: usize| three[0].1[i] + share * (three[2].1[i] - three[0].1[i]);
+                (0..3).map(|i| (three[1].1[i] - line(i)).powi(2)).sum::<f64>().sqrt()
+            };
+            ways.push((0..3).map(|i| (three[2].1[i] - three[0].1[i]).powi(2)).sum::<f64>().sqrt());
+            by_time.push(off((three[1].0 - three[0].0) / (three[2].0 - three[0].0)));
+            by_row.push(off(0.5));
+        }
+    }
+    // Those that go furthest: noise does not hide there what a wrong time makes of a speed.
+    let far = statistics::nearest_rank(ways.iter().copied(), 0.8)?;
+    let median = |off: &[f64]| {
+        statistics::nearest_rank(off.iter().zip(&ways).filter(|(_, way)| **way > far).map(|(off, _)| *off), 0.5)
+    };
+    Some(median(&by_time)? / median(&by_row)?.max(f64::MIN_POSITIVE))
+}
+
+/// Groups of columns that never change where others do.
+fn dead(log: &Log) -> Vec<Vec<Channel>> {
+    let sensed = |channel: &Channel| !matches!(channel, Channel::Command(_) | Channel::AddedMass);
+    let count =
+        |group: &[Channel]| log.episodes.iter().map(|episode| readings(episode, group[0]).count()).sum::<usize>();
+    let constant = |group: &[Channel]| {
+        group.iter().all(|channel| {
+            let mut values =
+                log.episodes.iter().flat_map(|episode| readings(episode, *channel)).map(|(_, value)| value);
+            values.next().is_none_or(|first| values.all(|value| value == first))
+        })
+    };
+    let found: Vec<Vec<Channel>> = groups(log)
+        .into_iter()
+        .filter(|group| sensed(&group[0]) && count(group) >= DEAD_ROWS && constant(group))
+        .collect();
+    let object = |group: &Vec<Channel>| matches!(group[0], Channel::ObjectPosition(_) | Channel::ObjectOrientation(_));
+    // An object that nothing moves has dead sensors of nothing.
+    if found.iter().any(object) { Vec::new() } else { found }
+}
+
+/// The log without the columns of dead sensors of force, torque and velocity.
+#[must_use]
+pub fn without_dead(log: &Log) -> Option<Log> {
+    let columns: Vec<Channel> = dead(log)
+        .into_iter()
+        .flatten()
+        .filter(|channel| !matches!(channel, Channel::Tool(_) | Channel::Joint(_)))
+        .collect();
+    (!columns.is_empty()).then(|| {
+        let mut log = log.clone();
+        log.episodes.iter_mut().for_each(|episode| episode.channels.retain(|channel, _| !columns.contains(channel)));
+        log
+    })
+}
+
+/// Single readings that stand out from those before and after by far more than these from each other.
+///
+/// Of places, which cannot go there and back; of forces only far beyond all others, and not where the object sets out: blows are as short. `blow`: whether it does,
+/// in an episode, by its index, at a time.
+fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64) -> bool) -> Option<Suspicion> {
+    let forces = matches!(group[0], Channel::WristForce(_));
+    if !forces && !matches!(group[0], Channel::Tool(_) | Channel::Joint(_) | Channel::ObjectPosition(_)) {
+        return None;
+    }
+    let sizes = log.episodes.iter().flat_map(|episode| group.iter().flat_map(|channel| readings(episode, *channel)));
+    let mut sizes: Vec<f64> = sizes.map(|(_, value)| value.abs()).collect();
+    sizes.sort_by(|a, b| b.total_cmp(a));
+    // But for a few.
+    let beyond = BEYOND * sizes.get(FEW).copied()?;
+    // Whatever it is, half of all neighbours differ by less.
+    let steps = |episode: &Episode, channel: Channel| -> Vec<f64> {
+        let read: Vec<f64> = readings(episode, channel).map(|(_, value)| value).collect();
+        read.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect()
+    };
+    let all = log.episodes.iter().flat_map(|episode| group.iter().flat_map(move |channel| steps(episode, *channel)));
+    let usual = statistics::nearest_rank(all, 0.9)?;
+    let mut far: Vec<(f64, u64, f64, Channel, f64)> = Vec::new();
+    for (index, episode) in log.episodes.iter().enumerate() {
+        for channel in group {
+            let read: Vec<(usize, f64)> = readings(episode, *channel).collect();
+            for seven in read.windows(7) {
+                let value = |i: usize| seven[i].1;
+                let alone = (value(3) - 0.5 * (value(2) + value(4))).abs() - 0.5 * (value(4) - value(2)).abs();
+                // A bounce has a corner too, but neighbours that go as far.
+                let near = [(0, 1), (1, 2), (4, 5), (5, 6)].map(|(a, b)| (value(b) - value(a)).abs());
+                let limit = SPIKE * near.into_iter().fold(usual, f64::max);
+                let row = seven[3].0;
+                let secs = episode.time_secs[row];
+                if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs))) {
+                    far.push((alone / usual, episode.id, secs, *channel, value(3)));
+                }
+            }
+        }
+    }
+    let worst = far.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let count = match far.len() {
+        1 => String::new(),
+        many => format!(" So do {} other readings.", many - 1),
+    };
+    let found = format!("{} reads {:.4} in one row, and not before or after.{count}", worst.3.name(), worst.4);
+    let mut suspicion = Suspicion::new(Kind::Outliers, found, "Leave such cells empty.");
+    suspicion.shown_at = Some((worst.1, worst.2));
+    Some(suspicion)
+}
+
+/// Episodes that are copies of earlier ones.
+fn repeated(log: &Log) -> Option<Suspicion> {
+    let measured = |episode: &Episode| -> Vec<Channel> {
+        episode.channels.keys().copied().filter(|c| !matches!(c, Channel::Command(_) | Channel::AddedMass)).collect()
+    };
+    let same = |a: &Episode, b: &Episode| {
+        a.rows() >= COPY_ROWS
+            && a.rows() == b.rows()
+            && measured(a).iter().all(|channel| a.channels.get(channel) == b.channels.get(channel))
+    };
+    let moves = |episode: &Episode| {
+        measured(episode).iter().any(|channel| {
+            let mut values = readings(episode, *channel).map(|(_, value)| value);
+            values.next().is_some_and(|first| values.any(|value| value != first))
+        })
+    };
+    let copies: Vec<(u64, u64)> = log
+        .episodes
+        .iter()
+        .enumerate()
+        .filter_map(|(i, episode)| {
+            let original = log.episodes[..i].iter().find(|earlier| same(earlier, episode) && moves(episode))?;
+            Some((episode.id, original.id))
+        })
+        .collect();
+    let (copy, original) = copies.first()?;
+    let found = format!(
+        "{} episodes repeat the readings of an earlier one, number {copy} those of number {original}.",
+        copies.len()
+    );
+    Some(Suspicion::new(
+        Kind::Repeated,
+        found,
+        "Take the copies out: they would count twice, and be fitted and held out at once.",
+    ))
+}
