@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::columns::{Cell, Columns, Role};
 use crate::error::Problem;
-use crate::{Error, Header, Log, MAX_ROWS};
+use crate::{Error, Header, Log, MAX_ROWS, Readings};
 
 impl Log {
     /// Of columns by the names that they have in `samples.csv`, one number a row: SI units, NaN where nothing was read. `name` stands for the file in
@@ -76,7 +76,7 @@ impl Log {
             columns.push((Role::Action.name(), actions.map(|action| action.map_or(f64::NAN, f64::from)).collect()));
         }
         for channel in first.channels.keys() {
-            let readings = episodes.iter().filter_map(|e| e.channels.get(channel)).flat_map(|cells| cells.iter());
+            let readings = episodes.iter().filter_map(|e| e.channels.get(channel)).flat_map(Readings::iter);
             columns.push((channel.name(), readings.map(|reading| reading.unwrap_or(f64::NAN)).collect()));
         }
         columns

@@ -30,7 +30,6 @@ impl Log {
 
     /// Of columns of 64-bit floats, NaN where nothing was read. `header`: TOML as in log.toml, or JSON of the same keys.
     #[staticmethod]
-    #[expect(clippy::needless_pass_by_value, reason = "what Python gives is owned")]
     fn of_columns(
         columns: Vec<(String, Bound<'_, PyBytes>)>,
         header: &str,

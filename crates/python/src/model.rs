@@ -68,6 +68,9 @@ pub(crate) fn nominal(log: &Log, root: Option<&Path>) -> Result<Nominal, Error> 
     Nominal::new(&log.log.header, rig_tool(&log.log, root)?)
 }
 
+/// What columns begin with, and where they are from.
+type Side = (&'static str, fn(&Row) -> &Seen);
+
 /// Rows as columns: NaN where nothing was read. Without a tool there are no columns of it.
 fn columns(rows: &[Row]) -> Columns {
     const AXES: [&str; 3] = ["x", "y", "z"];
@@ -77,8 +80,7 @@ fn columns(rows: &[Row]) -> Columns {
         column("piece".into(), &|row| row.piece as f64),
         column("time_secs".into(), &|row| row.time_secs),
     ];
-    let sides: [(&str, fn(&Row) -> &Seen); 2] =
-        [("measured", |row| &row.measured), ("simulated", |row| &row.simulated)];
+    let sides: [Side; 2] = [("measured", |row| &row.measured), ("simulated", |row| &row.simulated)];
     for (side, seen) in sides {
         for (index, axis) in AXES.iter().enumerate() {
             let cell = |row: &Row| seen(row).object_m.map_or(f64::NAN, |place| place[index]);
