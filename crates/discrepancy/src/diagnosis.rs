@@ -11,7 +11,6 @@ use crate::budget::Budget;
 use crate::candidate::{Candidate, Context, candidates};
 use crate::context::context;
 use crate::decision::{Decision, Probabilities};
-use crate::driven::driven;
 use crate::error::Error;
 use crate::evidence::Evidence;
 use crate::findings::Findings;
@@ -19,9 +18,9 @@ use crate::fit::{Begin, Effort, Fit, fit};
 use crate::likelihood::mean_square;
 use crate::locate::{Cell, locate};
 use crate::model::Model;
-use crate::noise::{NoiseLevels, SensorNoise};
+use crate::noise::SensorNoise;
 use crate::nominal::{Nominal, Tunable};
-use crate::plausible;
+use crate::prepared::Prepared;
 use crate::progress::Progress;
 use crate::replay::worst;
 use crate::report::Verdict;
@@ -31,7 +30,6 @@ use crate::search::Search;
 use crate::separate::OPEN;
 use crate::simulator::{Hypothesis, Simulator};
 use crate::split::{Compared, HeldOut, LEAST_FITTED, Split, ranking};
-use crate::stamps::period_secs;
 use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
 use crate::touch::{ContactGap, contact_gap};
@@ -255,21 +253,12 @@ fn diagnose_among(
     progress: &dyn Progress,
     catalogue: &dyn Fn(&Context) -> Vec<Candidate>,
 ) -> Result<Diagnosis, Error> {
+    let tunables = nominal.tunables.clone();
     // A sensor that is not there measures nothing.
     let alive = without_dead(log);
-    let log = &*driven(alive.as_ref().unwrap_or(log), name, nominal)?;
-    let units = Units::of(log);
-    let (mut log, tunables) = (units.inverse().log(log), nominal.tunables.clone());
-    let period_secs = period_secs(&log);
-    if period_secs != log.header.period_secs {
-        log.to_mut().header.period_secs = period_secs;
-    }
-    let log = &*log;
-    let nominal = &nominal.in_units(&units.inverse())?.with_period_secs(period_secs);
-    let noise = NoiseLevels::of_log(log);
-    plausible::check(log, name, nominal, (&noise, &units), LEAST_FITTED)?;
-    let Compared { trials, fitted, choosing, reported, left_out } =
-        Compared::new(log, name, nominal, &noise, settings)?;
+    let prepared = Prepared::new(alive.as_ref().unwrap_or(log), name, nominal, LEAST_FITTED)?;
+    let Prepared { log, nominal, noise, units } = &prepared;
+    let Compared { trials, fitted, choosing, reported, left_out } = Compared::new(log, name, nominal, noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
     let simulator = Simulator::new(nominal, &trials).watched_by(progress, settings.limit);
@@ -283,7 +272,7 @@ fn diagnose_among(
         return Err(no_numbers(name));
     }
     simulator.stage("screening the effects");
-    let context = context(&study, &null, log, &noise);
+    let context = context(&study, &null, log, noise);
     // What was simulated so far depends on the log alone; what the screening takes, on the catalogue.
     let screened = if nominal.has_tool() { SCREENED } else { SCREENED_THROWN };
     let before = simulator.rollouts() + screened * part.rollouts();
@@ -302,8 +291,8 @@ fn diagnose_among(
     };
     simulator.stage("fitting effects");
     let found = search.effects(&screening, &null, &episodes);
-    let noise = noise.all().map(|noise| noise.in_units(&units)).collect();
-    conclude(&search, found, episodes, About { log: name, units, tunables, noise, left_out })
+    let noise = noise.all().map(|noise| noise.in_units(units)).collect();
+    conclude(&search, found, episodes, About { log: name, units: *units, tunables, noise, left_out })
 }
 
 /// What a diagnosis says of its log.

@@ -33,6 +33,7 @@
 //! ```
 
 mod accept;
+pub mod answer;
 mod begin;
 pub mod budget;
 pub mod candidate;
@@ -57,9 +58,11 @@ pub mod model_file;
 pub mod noise;
 pub mod nominal;
 pub mod obstacle;
+mod overlay;
 mod page;
 mod patch;
 mod plausible;
+mod prepared;
 mod progress;
 mod replay;
 pub mod report;
@@ -86,11 +89,13 @@ use measured_log::{Axis, Channel, Log, Robot};
 use physics_model::rig::RigTool;
 use physics_model::robot::{Robot as Arm, RobotConfig, find_root};
 
+pub use answer::Answer;
 pub use begin::are_twins;
 pub use diagnosis::{Diagnosis, Settings, diagnose, diagnose_watched};
 pub use error::Error;
 pub use model_file::ModelFile;
 pub use nominal::Nominal;
+pub use overlay::{Row, Seen, overlay};
 pub use page::page;
 pub use progress::Progress;
 pub use report::{Report, Verdict};

@@ -5,14 +5,14 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
+use discrepancy::answer::{FILES, check_place, make_place, owner};
 use discrepancy::interval::decimals;
-use discrepancy::{Error, ModelFile, Nominal, Report, Settings, Verdict, diagnose_watched, page, rig_tool};
+use discrepancy::{Answer, Error, ModelFile, Nominal, Report, Settings, Verdict, diagnose_watched, rig_tool};
 use measured_log::Robot;
 use physics_model::EffectConfig;
 use physics_model::robot::{check_root, find_root};
 use program::typed;
 use serde::Deserialize;
-use whole_file::Existing;
 
 #[path = "program/bar.rs"]
 mod bar;
@@ -82,18 +82,16 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     let log = measured_log::read(measured)?;
     let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
-    let owner = folder::owner(measured);
+    let owner = owner(measured);
     let default = || folder::default(Path::new("runs/diagnose"), measured, &owner, &FILES);
     let out = arguments.out.clone().unwrap_or_else(default);
     let begun = match &arguments.model {
-        Some(path) => Some(begin_with(path, &out, &mut nominal)?),
+        Some(path) => Some((path.display().to_string(), begin_with(path, &out, &mut nominal)?)),
         None => None,
     };
     // Before a minute is spent on what could not be written.
-    let free = whole_file::check_owner(&out, "report.json").and_then(|()| owner.check(&out, &FILES));
-    free.map_err(|source| Error::Taken { source })?;
-    let made: Vec<PathBuf> = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
-    std::fs::create_dir_all(&out).map_err(|source| Error::Folder { path: out.clone(), source })?;
+    check_place(&out, &owner)?;
+    let made = make_place(&out)?;
     let clean = || made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
     check_writable(&out).inspect_err(|_| clean())?;
     let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
@@ -101,21 +99,14 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     // A log that says too little leaves nothing behind.
     let watched = diagnose_watched(&log, &name, &nominal, &settings, &bar::Bar::new());
     let diagnosis = watched.inspect_err(|_| clean())?;
-    let mut report = Report::new(&diagnosis, &settings, started.elapsed().as_secs_f64());
-    report.warn(&log, &nominal);
-    report.model = arguments.model.as_ref().map(|path| path.display().to_string());
-    let json =
-        serde_json::to_string_pretty(&report).map_err(|error| Error::Model { reason: error.to_string() })? + "\n";
-    let model = ModelFile::new(&nominal, &diagnosis, &report, begun.as_ref()).to_toml()?;
-    owner.claim(&out)?;
-    for (file, text) in FILES.into_iter().zip([&model, &page(&name, &report), &json]) {
-        whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
-    }
+    let begun = begun.as_ref().map(|(name, model)| (name.as_str(), model));
+    let answer = Answer::new((&name, &log), &nominal, &diagnosis, &settings, begun, started.elapsed().as_secs_f64());
+    answer.write(&out, &owner)?;
     if arguments.json {
-        program::show(&json);
+        program::show(&answer.json()?);
     } else {
-        print_summary(&report);
-        suggest_next(arguments, measured, &report, &out, log.header.robot);
+        print_summary(&answer.report);
+        suggest_next(arguments, measured, &answer.report, &out, log.header.robot);
     }
     Ok(())
 }
@@ -131,24 +122,18 @@ fn list_effects(json: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// What is written, the report last: with it all is there.
-const FILES: [&str; 3] = ["model.toml", "report.html", "report.json"];
 /// Worker threads, at most.
 const MOST_THREADS: u64 = 1024;
 
 /// Gives a nominal model what the file at `path` says; it must not be one that this diagnosis would write over.
 fn begin_with(path: &Path, out: &Path, nominal: &mut Nominal) -> Result<ModelFile, Error> {
     let model = ModelFile::read(path)?;
-    let refuse = |reason: String| Error::Model { reason: format!("{}: {reason}", path.display()) };
     if path.canonicalize().ok().is_some_and(|path| out.join("model.toml").canonicalize().is_ok_and(|own| own == path)) {
-        return Err(refuse(
-            "expected another folder for the results than the model's: --out would write over it".into(),
-        ));
+        let reason = "expected another folder for the results than the model's: --out would write over it";
+        return Err(Error::Model { reason: format!("{}: {reason}", path.display()) });
     }
-    match model.apply(nominal) {
-        Err(Error::Model { reason }) => Err(refuse(reason)),
-        done => done.map(|()| model),
-    }
+    model.apply_as(&path.display().to_string(), nominal)?;
+    Ok(model)
 }
 
 /// Whether the results can be written: a disk may refuse.

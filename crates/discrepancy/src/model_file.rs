@@ -22,7 +22,7 @@ use whole_file::{one_line, plain};
 
 use crate::diagnosis::Diagnosis;
 use crate::error::Error;
-use crate::nominal::Nominal;
+use crate::nominal::{Nominal, Tunable};
 use crate::report::{NamedEffect, Report};
 
 /// Version of the format.
@@ -130,6 +130,29 @@ impl ModelFile {
         Ok(file)
     }
 
+    /// Of the nominal model alone, as it was re-tuned before effects were looked for.
+    #[must_use]
+    pub fn retuned(nominal: &Nominal, diagnosis: &Diagnosis) -> Self {
+        let value = |(tunable, z): (&Tunable, &f64)| (tunable.key.clone(), tunable.value(*z));
+        Self {
+            nominal: diagnosis.tunables.iter().zip(&diagnosis.nominal.x).map(value).collect(),
+            ..Self::of_effects(nominal.effects.clone())
+        }
+    }
+
+    /// Coordinates of what may be re-tuned at the values of the file; 0 where it says nothing.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::apply`].
+    pub fn coordinates(&self, nominal: &Nominal) -> Result<Vec<f64>, Error> {
+        // The values of a model are looked at in one place.
+        let mut applied = nominal.clone();
+        self.apply(&mut applied)?;
+        let pairs = nominal.tunables.iter().zip(&applied.tunables);
+        Ok(pairs.map(|(nominal, applied)| nominal.coordinate(applied.mean)).collect())
+    }
+
     /// Gives a nominal model what the file says: values become the means of what may be re-tuned, effects are switched on.
     ///
     /// # Errors
@@ -151,6 +174,18 @@ impl ModelFile {
         }
         nominal.effects.extend(self.effects.model.iter().cloned());
         Ok(())
+    }
+
+    /// The same of a model called `name`, which an error begins with.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::apply`].
+    pub fn apply_as(&self, name: &str, nominal: &mut Nominal) -> Result<(), Error> {
+        self.apply(nominal).map_err(|error| match error {
+            Error::Model { reason } => Error::Model { reason: format!("{name}: {reason}") },
+            other => other,
+        })
     }
 
     /// As TOML.

@@ -7,7 +7,8 @@ pub trait Progress: Debug + Sync {
     /// A stage begins.
     fn stage(&self, stage: &'static str);
 
-    /// So many episodes are simulated, of a budget that the search does not exceed by much.
+    /// So many episodes are simulated, of a budget that the search does not exceed by much. Every simulation says so: who does not want to wait any longer
+    /// ends a diagnosis by unwinding from here (`std::panic::resume_unwind`).
     fn simulated(&self, episodes: usize, budget: usize);
 }
 

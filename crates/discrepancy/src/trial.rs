@@ -27,6 +27,7 @@ use crate::noise::NoiseLevels;
 pub use kind::Kind;
 pub use phase::Phase;
 pub use series::Compared;
+pub(crate) use series::Place;
 pub(crate) use touch::Touch;
 pub(crate) use windows::Window;
 
@@ -67,6 +68,12 @@ impl<'a> Course<'a> {
     fn value(&self, channel: Channel, (tick, share): (usize, f64)) -> f64 {
         let value = predicted(self.at(tick), channel);
         if share > 0.0 { value + share * (predicted(self.at(tick + 1), channel) - value) } else { value }
+    }
+
+    /// The object's orientation there.
+    fn orientation(&self, (tick, share): (usize, f64)) -> UnitQuaternion<f64> {
+        let simulated = orientation(self.at(tick));
+        if share > 0.0 { simulated.nlerp(&orientation(self.at(tick + 1)), share) } else { simulated }
     }
 }
 
@@ -289,12 +296,8 @@ impl Trial {
         }
         if let Some((sigma, values)) = &self.orientation {
             let turns: Vec<Option<Vector3<f64>>> = (values.iter().zip(&self.rows))
-                .map(|(measured, (tick, share))| {
-                    let mut simulated = orientation(course.at(*tick));
-                    if *share > 0.0 {
-                        simulated = simulated.nlerp(&orientation(course.at(tick + 1)), *share);
-                    }
-                    measured.map(|measured| (measured * simulated.inverse()).scaled_axis())
+                .map(|(measured, row)| {
+                    measured.map(|measured| (measured * course.orientation(*row).inverse()).scaled_axis())
                 })
                 .collect();
             for block in blocks {

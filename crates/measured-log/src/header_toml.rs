@@ -106,8 +106,12 @@ impl RawObject {
     }
 }
 
-/// Parses `text`, the content of `path`.
-pub(crate) fn parse(path: &Path, text: &str) -> Result<Header, Error> {
+/// Parses `text`, the content of the `log.toml` at `path`.
+///
+/// # Errors
+///
+/// [`Error`] with the line or the key, and what was expected.
+pub fn parse(path: &Path, text: &str) -> Result<Header, Error> {
     let value: toml::Table = toml::from_str(text).map_err(|e| {
         let line = whole_file::line_of(text, e.span().map_or(0, |span| span.start));
         Error::Syntax {
@@ -161,7 +165,8 @@ pub fn header(path: &Path, value: toml::Table) -> Result<Header, Error> {
 }
 
 /// TOML text that [`parse`] reads back to the same header, with `notes` as comments.
-pub(crate) fn print(header: &Header, notes: &Notes) -> String {
+#[must_use]
+pub fn print(header: &Header, notes: &Notes) -> String {
     let mut text = String::new();
     comment(&mut text, notes, "");
     let mut line = |key: &str, value: String| {

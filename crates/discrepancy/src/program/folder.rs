@@ -4,12 +4,6 @@ use std::path::{Path, PathBuf};
 
 use whole_file::Owner;
 
-/// The owner of an answer: the log, wherever it is called from.
-pub(crate) fn owner(measured: &Path) -> Owner {
-    let log = measured.canonicalize().unwrap_or_else(|_| measured.to_path_buf());
-    Owner { program: "diagnose", subject: log.display().to_string() }
-}
-
 /// The folder in `runs` where none is given: named after the log's; where that holds the answer to another log, or files of somebody else, with a hash of the log's path.
 pub(crate) fn default(runs: &Path, measured: &Path, owner: &Owner, files: &[&str]) -> PathBuf {
     let name = measured.canonicalize().ok().and_then(|path| Some(path.file_name()?.to_string_lossy().into_owned()));
@@ -25,6 +19,8 @@ pub(crate) fn default(runs: &Path, measured: &Path, owner: &Owner, files: &[&str
 
 #[cfg(test)]
 mod tests {
+    use discrepancy::answer::owner;
+
     use super::*;
 
     #[test]

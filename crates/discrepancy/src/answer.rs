@@ -1,0 +1,104 @@
+//! What a diagnosis leaves behind: `report.json`, `report.html` and `model.toml`, whoever asked for them.
+
+use std::path::{Path, PathBuf};
+
+use measured_log::Log;
+use whole_file::{Existing, Owner};
+
+use crate::diagnosis::{Diagnosis, Settings};
+use crate::error::Error;
+use crate::model_file::ModelFile;
+use crate::nominal::Nominal;
+use crate::page::page;
+use crate::report::Report;
+
+/// What is written, the report last: with it all is there.
+pub const FILES: [&str; 3] = ["model.toml", "report.html", "report.json"];
+
+/// The answer to a log.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// What the log is called, as a rule its folder.
+    pub name: String,
+    /// Content of `report.json`.
+    pub report: Report,
+    /// Content of `model.toml`.
+    pub model: ModelFile,
+}
+
+impl Answer {
+    /// Of a diagnosis of the `log` called `name` that took so many seconds. `begun`: the model that `nominal` began with, and what it is called.
+    #[must_use]
+    pub fn new(
+        (name, log): (&str, &Log),
+        nominal: &Nominal,
+        diagnosis: &Diagnosis,
+        settings: &Settings,
+        begun: Option<(&str, &ModelFile)>,
+        seconds: f64,
+    ) -> Self {
+        let mut report = Report::new(diagnosis, settings, seconds);
+        report.warn(log, nominal);
+        report.model = begun.map(|(name, _)| name.into());
+        let model = ModelFile::new(nominal, diagnosis, &report, begun.map(|(_, file)| file));
+        Self { name: name.into(), report, model }
+    }
+
+    /// Text of `report.json`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Model`] for a value that JSON cannot hold.
+    pub fn json(&self) -> Result<String, Error> {
+        let text = serde_json::to_string_pretty(&self.report);
+        Ok(text.map_err(|error| Error::Model { reason: error.to_string() })? + "\n")
+    }
+
+    /// Text of `report.html`.
+    #[must_use]
+    pub fn page(&self) -> String {
+        page(&self.name, &self.report)
+    }
+
+    /// Writes [`FILES`] into a folder that is there and may be written to (see [`check_place`]).
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Write`] where the system refuses, [`Error::Model`] for a value that a file cannot hold.
+    pub fn write(&self, out: &Path, owner: &Owner) -> Result<(), Error> {
+        let texts = [self.model.to_toml()?, self.page(), self.json()?];
+        owner.claim(out)?;
+        for (file, text) in FILES.into_iter().zip(&texts) {
+            whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
+        }
+        Ok(())
+    }
+}
+
+/// The owner of an answer: the log, wherever it is called from.
+#[must_use]
+pub fn owner(measured: &Path) -> Owner {
+    let log = measured.canonicalize().unwrap_or_else(|_| measured.to_path_buf());
+    Owner { program: "diagnose", subject: log.display().to_string() }
+}
+
+/// Whether a folder may hold the answer: it holds nobody else's.
+///
+/// # Errors
+///
+/// [`Error::Taken`] with what is there.
+pub fn check_place(out: &Path, owner: &Owner) -> Result<(), Error> {
+    let free = whole_file::check_owner(out, "report.json").and_then(|()| owner.check(out, &FILES));
+    free.map_err(|source| Error::Taken { source })
+}
+
+/// Makes the folder `out` and those above it; the ones that were made.
+///
+/// # Errors
+///
+/// [`Error::Folder`] where the system refuses.
+pub fn make_place(out: &Path) -> Result<Vec<PathBuf>, Error> {
+    let made = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
+    std::fs::create_dir_all(out).map_err(|source| Error::Folder { path: out.into(), source })?;
+    Ok(made)
+}
