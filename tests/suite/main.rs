@@ -17,4 +17,5 @@ mod output;
 mod pages;
 mod pipeline;
 mod places;
+mod python;
 mod world;
