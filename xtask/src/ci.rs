@@ -20,8 +20,8 @@ const REQUIRE_ALL: &str = "SURMISE_REQUIRE_ALL";
 const CHECKS: [&[&str]; 3] = [
     &["fmt", "--all", "--check"],
     &["clippy", "--release", "--workspace", "--all-targets", "--", "--deny", "warnings"],
-    // The programs that tests run.
-    &["build", "--release", "--workspace", "--bins"],
+    // The programs that tests run, and the extension that Python loads.
+    &["build", "--release", "--workspace", "--lib", "--bins"],
 ];
 const WITH_NEXTEST: [&[&str]; 2] = [
     &["nextest", "run", "--release", "--workspace", "--profile", "ci"],
