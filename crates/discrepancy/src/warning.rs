@@ -33,17 +33,27 @@ pub fn check(log: &Log, tool: &RigTool) -> Check {
     let arm = if let RigTool::Arm(arm) = tool { Some(&**arm) } else { None };
     let mut check = log_check::check(log, arm);
     let noise = NoiseLevels::of_log(log);
-    check.suspicions.extend(noise.all().filter_map(|noise| {
-        let scatter = noise.scatter.filter(|_| noise.source == Source::Given)?;
-        noise.contradicts().then(|| {
-            let (name, unit) = (noise.channel.name(), noise.unit);
-            let found = format!(
-                "log.toml gives {name} a noise of {:.2e} {unit}, its readings scatter by {scatter:.2e}.",
-                noise.stddev
-            );
-            Suspicion::new(Kind::Noise, found, "Give what the sensor has, or leave it out: it is then estimated.")
+    let contradicted: Vec<Suspicion> = noise
+        .all()
+        .filter_map(|noise| {
+            let scatter = noise.scatter.filter(|_| noise.source == Source::Given)?;
+            // What a coarse step makes of a reading is no scatter.
+            let columns = noise.channel.channels(usize::from(log.header.robot.joints()));
+            let column = columns.first().map_or_else(|| "object_qx".into(), |channel| channel.name());
+            let step =
+                check.sensors.iter().find(|sensor| sensor.column == column).and_then(|sensor| sensor.smallest_step);
+            let coarse = step.is_some_and(|step| scatter < 3.0 * step);
+            (noise.contradicts() && !coarse).then(|| {
+                let (name, unit) = (noise.channel.name(), noise.unit);
+                let found = format!(
+                    "log.toml gives {name} a noise of {:.2e} {unit}, its readings scatter by {scatter:.2e}.",
+                    noise.stddev
+                );
+                Suspicion::new(Kind::Noise, found, "Give what the sensor has, or leave it out: it is then estimated.")
+            })
         })
-    }));
+        .collect();
+    check.suspicions.extend(contradicted);
     check
 }
 

@@ -62,7 +62,7 @@ pub(crate) fn suspicion(log: &Log, arm: &Robot) -> Option<Suspicion> {
     let mut readings: Vec<(f64, Reading)> = candidates(count, &rows, arm)
         .into_iter()
         .filter_map(|reading| Some((distance(Some(&reading))?, reading)))
-        .filter(|(left, _)| *left < LEFT_SHARE * own)
+        .filter(|(left, _)| *left < (LEFT_SHARE * own).min(2.0 * TOLERANCE_M))
         .collect();
     readings.sort_by(|a, b| a.0.total_cmp(&b.0));
     let found =

@@ -24,11 +24,17 @@ const AS_GOOD: f64 = 0.1;
 const COSINE_GAIN: f64 = 0.5;
 const LEAST_COSINE: f64 = 0.6;
 const COSINE_ERRORS: f64 = 4.0;
+/// Forces that pull by this much are reversed, however much else turns them.
+const LEAST_REVERSED: f64 = 0.2;
+/// Share of onsets at which tool and object meet under the reading that is offered.
+const MEETS: f64 = 0.75;
 /// Forces of pushes are friction · weight within this factor; what rolls needs less.
 const STRENGTH: f64 = 5.0;
 /// A torque's lever beyond the tool's own reach, m, and the share of torques that it has to explain.
 const LEVER_M: f64 = 0.02;
 const LEVER_EXPLAINED: f64 = 0.8;
+/// No wrist is so far from its tool, m: that is another unit.
+const FAR_M: f64 = 1.0;
 /// Share of onsets at which tool and object have to meet if no reading mends it.
 const LEAST_MET: f64 = 0.25;
 /// A known weight that is this many times the object's is asked about.
@@ -153,6 +159,10 @@ fn of_geometry(log: &Log, tool: &Tool, motions: &Motions, own: &Fit) -> (Option<
     if own.cost() - best < GAIN {
         return (lost(own), not_told);
     }
+    if fits.first().and_then(|(_, fit)| fit.touch).is_some_and(|touch| touch.met < MEETS) {
+        // Better is not good.
+        return (Some(unexplained(own)), not_told);
+    }
     let good: Vec<&(Reading, Fit)> = fits.iter().filter(|(_, fit)| fit.cost() < best + AS_GOOD).collect();
     let raised = good.iter().all(|(reading, _)| matches!(reading, Reading::TableAt(_) | Reading::OriginAt(_)));
     let found = match (own.rest, own.touch) {
@@ -201,10 +211,13 @@ fn broken(rest: Option<geometry::Rest>, touch: Option<geometry::Touch>) -> Strin
 
 /// A log whose tool is not where the object sets out, and that no reading mends.
 fn lost(own: &Fit) -> Option<Suspicion> {
-    let touch = own.touch.filter(|touch| touch.met < LEAST_MET)?;
+    own.touch.filter(|touch| touch.met < LEAST_MET).map(|_| unexplained(own))
+}
+
+fn unexplained(own: &Fit) -> Suspicion {
     let mend =
         "No usual mistake explains it. Check frames, clocks, sizes, and whether something else moves the object.";
-    Some(Suspicion::new(Kind::Geometry, broken(own.rest, Some(touch)), mend))
+    Suspicion::new(Kind::Geometry, broken(own.rest, own.touch), mend)
 }
 
 /// What poses and sizes cannot show in this log; `same`: readings that change nothing.
@@ -227,6 +240,9 @@ fn not_told(log: &Log, own: &Fit, motions: &Motions, same: &[Reading]) -> Vec<St
 
 fn of_axes(contacts: &Contacts, own: Option<Forces>) -> Option<Suspicion> {
     let own = own?;
+    if own.cosine < -LEAST_REVERSED && own.cosine < -COSINE_ERRORS * own.error {
+        return Some(reversed(contacts, own));
+    }
     let mut all: Vec<(Reading, Forces)> =
         wrench::axes().into_iter().filter_map(|reading| Some((reading, contacts.forces(Some(&reading))?))).collect();
     let best = all.iter().map(|(_, forces)| forces.cosine).fold(f64::NEG_INFINITY, f64::max);
@@ -236,22 +252,53 @@ fn of_axes(contacts: &Contacts, own: Option<Forces>) -> Option<Suspicion> {
     }
     // The order is that of how common they are.
     all.retain(|(_, forces)| forces.cosine > best - 0.02);
-    let angle = |cosine: f64| cosine.clamp(-1.0, 1.0).acos().to_degrees();
-    let found = format!(
+    let ways: Vec<String> = all.iter().take(3).map(|(reading, _)| reading.words()).collect();
+    let mend = format!("It is {:.0}° {}.", angle(all.first()?.1.cosine), ways.join(", or "));
+    let mut suspicion = Suspicion::new(Kind::WrenchAxes, aside(own), &mend);
+    suspicion.readings = all.into_iter().map(|(reading, _)| reading).collect();
+    Some(suspicion)
+}
+
+/// Forces that pull where they should push: whatever else turns them, their sign is wrong, or their axes are.
+fn reversed(contacts: &Contacts, own: Forces) -> Suspicion {
+    let reading = Reading::Wrench(wrench::REVERSED);
+    let then = contacts.forces(Some(&reading)).map_or(1.0, |forces| forces.cosine);
+    let others: Vec<Reading> = wrench::axes()
+        .into_iter()
+        .skip(1)
+        .filter(|other| contacts.forces(Some(other)).is_some_and(|forces| forces.cosine > then - 0.02))
+        .collect();
+    let better = others
+        .iter()
+        .find(|other| contacts.forces(Some(other)).is_some_and(|forces| forces.cosine > then + COSINE_GAIN));
+    let first = better.copied().unwrap_or(reading);
+    let with = contacts.forces(Some(&first)).map_or(then, |forces| forces.cosine);
+    let also = if better.is_none() { others.first().map(|other| format!(", or {}", other.words())) } else { None };
+    let mend = format!("It is {:.0}° {}{}.", angle(with), first.words(), also.unwrap_or_default());
+    let mut suspicion = Suspicion::new(Kind::WrenchAxes, aside(own), &mend);
+    suspicion.readings = std::iter::once(first).chain(others.into_iter().filter(|other| *other != first)).collect();
+    suspicion
+}
+
+fn aside(own: Forces) -> String {
+    format!(
         "Forces on the tool point {:.0}° away from where the object would push it, in {} episodes with contact.",
         angle(own.cosine),
         own.episodes
-    );
-    let ways: Vec<String> = all.iter().take(3).map(|(reading, _)| reading.words()).collect();
-    let mend = format!("It is {:.0}° {}.", angle(all.first()?.1.cosine), ways.join(", or "));
-    let mut suspicion = Suspicion::new(Kind::WrenchAxes, found, &mend);
-    suspicion.readings = all.into_iter().map(|(reading, _)| reading).collect();
-    Some(suspicion)
+    )
+}
+
+fn angle(cosine: f64) -> f64 {
+    cosine.clamp(-1.0, 1.0).acos().to_degrees()
 }
 
 /// `rolls`: what rolls is pushed with any small force.
 fn of_strength(forces: Option<Forces>, rolls: bool) -> Option<Suspicion> {
     let strength = forces?.strength;
+    if !(strength > 0.0 && strength < 1e7) {
+        // Without gravity or friction there is nothing to compare with.
+        return None;
+    }
     if strength < STRENGTH && (rolls || strength > STRENGTH.recip()) {
         return None;
     }
@@ -265,20 +312,23 @@ fn of_strength(forces: Option<Forces>, rolls: bool) -> Option<Suspicion> {
     let off = |factor: &f64| (factor * strength).ln().abs();
     let (factor, unit) = FACTORS.into_iter().min_by(|a, b| off(&a.0).total_cmp(&off(&b.0)))?;
     let found = format!(
-        "Pushes take {strength:.2} times the friction of the object on the table, by its mass, friction and gravity."
+        "Pushes take {strength:.3e} times the friction of the object on the table, by its mass, friction and gravity."
     );
     let mend = if off(&factor) < 0.5 * off(&1.0) {
-        format!("Are forces in {unit}? Else check mass, added mass and friction.")
+        format!(
+            "Are forces in {unit}, or is the mass, the added mass or the friction wrong by {:.0}?",
+            factor.max(factor.recip())
+        )
     } else {
         "Check the unit of forces, mass, added mass and friction.".into()
     };
-    let mut suspicion = Suspicion::new(Kind::ForceUnit, found, &mend);
-    suspicion.readings.extend((off(&factor) < 0.5 * off(&1.0)).then_some(Reading::ForceScaled(factor)));
-    Some(suspicion)
+    // Forces and masses cannot be told from each other: nothing is mended unasked.
+    Some(Suspicion::new(Kind::ForceUnit, found, &mend))
 }
 
 fn of_lever(lever: Lever, reach_m: f64) -> Option<Suspicion> {
-    if lever.explained < LEVER_EXPLAINED || lever.length_m < reach_m + LEVER_M {
+    let far = lever.length_m > FAR_M;
+    if (lever.explained < LEVER_EXPLAINED && !far) || lever.length_m < reach_m + LEVER_M {
         return None;
     }
     let [x, y, z] = lever.at_m.map(|at| -at);
@@ -287,7 +337,6 @@ fn of_lever(lever: Lever, reach_m: f64) -> Option<Suspicion> {
         1e3 * lever.length_m,
         1e3 * reach_m
     );
-    let far = lever.length_m > 10.0 * (reach_m + LEVER_M);
     let (mend, reading) = if far {
         ("Are they in N·mm?".into(), Reading::TorqueScaled(1e-3))
     } else {

@@ -143,6 +143,19 @@ impl Reading {
         }
     }
 
+    /// The velocity and angular velocity of the object that those of the log then stand for.
+    fn rates(&self, velocity: Vector3<f64>, spin: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
+        match self {
+            Self::TrackerTurned(quarters) => (quarter_turns(*quarters) * velocity, quarter_turns(*quarters) * spin),
+            // A turn about an axis changes its sense in a mirror.
+            Self::Mirrored(axis) => (mirror(*axis) * velocity, -(mirror(*axis) * spin)),
+            Self::PositionMirrored(axis) => (mirror(*axis) * velocity, spin),
+            Self::PositionSwapped => (Vector3::new(velocity.y, velocity.x, velocity.z), spin),
+            Self::PositionScaled(factor) => (velocity * *factor, spin),
+            _ => (velocity, spin),
+        }
+    }
+
     /// The wrench that one of the log then stands for: force, N, and torque, N·m.
     pub(crate) fn wrench(&self, force: Vector3<f64>, torque: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         match self {
@@ -235,6 +248,15 @@ impl Reading {
                 Axis::ALL.iter().enumerate().for_each(|(i, axis)| set(Channel::WristForce(*axis), row, new[i]));
                 if torque.is_some() {
                     Axis::ALL.iter().enumerate().for_each(|(i, axis)| set(Channel::WristTorque(*axis), row, turned[i]));
+                }
+            }
+            for (channel, spins) in
+                [(Channel::ObjectVelocity as fn(Axis) -> Channel, false), (Channel::ObjectSpin, true)]
+            {
+                if let Some(rate) = episode.vector(channel, row) {
+                    let (velocity, spin) = self.rates(Vector3::from(rate), Vector3::from(rate));
+                    let new = if spins { spin } else { velocity };
+                    Axis::ALL.iter().enumerate().for_each(|(i, axis)| set(channel(*axis), row, new[i]));
                 }
             }
             let angles: Option<Vec<f64>> =

@@ -18,6 +18,8 @@ const COPY_ROWS: usize = 10;
 const RATE_SHARE: f64 = 0.004;
 /// A sensor whose rate differs by more than this has one of its own.
 const NEAR_RATE: f64 = 0.15;
+/// Nobody reads so many ticks apart, or so often a tick: that is another unit.
+const OTHER_UNIT: f64 = 50.0;
 /// Distances of rows that scatter by this share may be those of arrival: if motion is so many times smoother by the number of the row.
 const JITTER_SHARE: f64 = 0.05;
 const SMOOTHER: f64 = 1.5;
@@ -174,7 +176,11 @@ pub(crate) fn suspicions(
         Suspicion::new(
             Kind::DeadSensor,
             format!("{column} and its neighbours read exactly {value} in all rows: the sensor is dead or was not connected."),
-            "Take these columns out; a diagnosis leaves them out.",
+            if group.iter().any(|channel| matches!(channel, Channel::Tool(_) | Channel::Joint(_))) {
+                "Take these columns out."
+            } else {
+                "Take these columns out; a diagnosis leaves them out."
+            },
         )
     }).collect();
     all.extend(clock.and_then(|clock| of_clock(log, clock)));
@@ -202,6 +208,15 @@ fn of_clock(log: &Log, clock: &Clock) -> Option<Suspicion> {
         ));
     }
     let off = clock.period_secs / period_secs;
+    if !(OTHER_UNIT.recip()..=OTHER_UNIT).contains(&off) {
+        let found =
+            format!("{} comes every {:.4} s, period_secs says {period_secs} s.", clock.column, clock.period_secs);
+        return Some(Suspicion::new(
+            Kind::Rate,
+            found,
+            "Are time_secs and period_secs both in seconds, and not in ms or ns?",
+        ));
+    }
     // Several readings a tick, and several ticks a reading, are allowed.
     let whole = if off > 1.0 { off / off.round() } else { off * off.recip().round() };
     let margin = RATE_SHARE + 4.0 * clock.error_secs / clock.period_secs;
@@ -355,10 +370,11 @@ fn repeated(log: &Log) -> Option<Suspicion> {
         })
         .collect();
     let (copy, original) = copies.first()?;
-    let found = format!(
-        "{} episodes repeat the readings of an earlier one, number {copy} those of number {original}.",
-        copies.len()
-    );
+    let others = match copies.len() {
+        1 => String::new(),
+        many => format!(" So do {} other episodes.", many - 1),
+    };
+    let found = format!("Episode {copy} repeats the readings of episode {original}.{others}");
     Some(Suspicion::new(
         Kind::Repeated,
         found,

@@ -138,5 +138,18 @@ pub(crate) fn axes() -> Vec<Reading> {
     let all = orders
         .iter()
         .flat_map(|order| signs.iter().map(move |sign| std::array::from_fn::<(u8, i8), 3, _>(|i| (order[i], sign[i]))));
-    all.filter(|axes| *axes != [(0, 1), (1, 1), (2, 1)]).map(Reading::Wrench).collect()
+    let mut all: Vec<[(u8, i8); 3]> = all.filter(|axes| *axes != [(0, 1), (1, 1), (2, 1)]).collect();
+    // The reaction, then what a frame can be turned to, then what only a slip of the pen makes.
+    all.sort_by_key(|axes| if *axes == REVERSED { 0 } else { 2 - u8::from(is_turn(axes)) });
+    all.into_iter().map(Reading::Wrench).collect()
+}
+
+/// What the tool exerts on the world.
+pub(crate) const REVERSED: [(u8, i8); 3] = [(0, -1), (1, -1), (2, -1)];
+
+/// Whether axes are right-handed.
+fn is_turn(axes: &[(u8, i8); 3]) -> bool {
+    let even = matches!(axes.map(|(axis, _)| axis), [0, 1, 2] | [1, 2, 0] | [2, 0, 1]);
+    let signs: i8 = axes.iter().map(|(_, sign)| sign).product();
+    even == (signs > 0)
 }

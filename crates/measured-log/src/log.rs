@@ -164,7 +164,10 @@ impl Log {
             let found = format!("{other} after {first}");
             return Err(Problem::cell(first_row + row, Channel::AddedMass.name(), expected, &found));
         }
-        let pose = |row| episode.orientation(row).and(episode.vector(Channel::ObjectPosition, row));
+        // A ball looks the same from all sides.
+        let ball = matches!(self.header.object.shape, Shape::Sphere { .. });
+        let turned = |row| ball || episode.orientation(row).is_some();
+        let pose = |row| episode.vector(Channel::ObjectPosition, row).filter(|_| turned(row));
         if self.header.robot == Robot::None && !(0..episode.rows()).any(|row| pose(row).is_some()) {
             let found = format!("none in episode {}", episode.id);
             return Err(Problem::cell(first_row, "object_x_m", "a whole object pose in each episode", &found));

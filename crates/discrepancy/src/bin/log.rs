@@ -112,17 +112,18 @@ fn print(log: &Log, check: &Check, sentences: &[String]) {
     }
     if let Some(touch) = check.fit.touch {
         program::out!(
-            "The object sets out {} times; the tool then touches it in {:.0} % and is {:.1} mm away in the median.",
+            "The object sets out {} times; the tool then touches it in {:.0} % and is {:.1} mm from its surface in the median.",
             touch.onsets,
             100.0 * touch.met,
-            1e3 * touch.distance_m
+            1e3 * touch.distance_m.abs()
         );
     }
     if let Some(rest) = check.fit.rest {
         program::out!(
-            "At rest it leans by {:.1}° and its lowest point is {:.1} mm above the table, in the median of {} episodes.",
+            "At rest it leans by {:.1}° and its lowest point is {:.1} mm {} the table, in the median of {} episodes.",
             rest.tilt_rad.to_degrees(),
-            1e3 * rest.height_m,
+            1e3 * rest.height_m.abs(),
+            if rest.height_m < 0.0 { "below" } else { "above" },
             rest.episodes
         );
     }
