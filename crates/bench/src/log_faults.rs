@@ -87,6 +87,10 @@ pub struct Row {
 /// The table.
 #[derive(Clone, Debug, Serialize)]
 pub struct Table {
+    /// Version of the project.
+    pub version: &'static str,
+    /// Its commit.
+    pub commit: String,
     /// The logs: last two parts of their folders.
     pub logs: Vec<String>,
     /// A row a fault.
@@ -100,7 +104,7 @@ pub struct Table {
 /// # Errors
 ///
 /// A folder that holds no log, or one of an arm.
-pub fn run(folders: &[PathBuf]) -> Result<Table> {
+pub fn run(folders: &[PathBuf], commit: String) -> Result<Table> {
     let read = |folder: &PathBuf| -> Result<(PathBuf, Log)> {
         let log = measured_log::read(folder)?;
         let arm = log.header.robot != measured_log::Robot::None;
@@ -126,6 +130,8 @@ pub fn run(folders: &[PathBuf]) -> Result<Table> {
         }
     });
     Ok(Table {
+        version: env!("CARGO_PKG_VERSION"),
+        commit,
         rows: rows.collect(),
         accused: accused.collect(),
         logs: folders.iter().map(|folder| name(folder)).collect(),
@@ -188,7 +194,7 @@ fn has(check: &Check, column: &str) -> bool {
 /// A spoilt log and what it has to be suspected of; `None` where it cannot be spoilt so, or is no valid log then.
 fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
     let mut spoilt = log.clone();
-    let has = |channel: Channel| log.episodes.iter().any(|episode| episode.channels.contains_key(&channel));
+    let has = |channel: Channel| log.has(channel);
     let force = Channel::WristForce(measured_log::Axis::X);
     let kind = match fault {
         Fault::Meant(reading, kind) => {
@@ -288,7 +294,14 @@ impl Table {
             };
             let _ = writeln!(text, "| {} | {} | {} | {share} | {} |", row.fault, row.logs, row.visible, row.mended);
         }
-        let _ = writeln!(text, "\nOf {} good logs {} are accused.", self.logs.len(), self.accused.len());
+        let _ = writeln!(
+            text,
+            "\nOf {} good logs {} are accused. Version {}, commit {}.",
+            self.logs.len(),
+            self.accused.len(),
+            self.version,
+            self.commit
+        );
         for (log, kinds) in &self.accused {
             let _ = writeln!(text, "- {log}: {kinds:?}");
         }
@@ -313,7 +326,7 @@ mod tests {
     fn what_can_be_seen_is_caught_and_good_logs_are_not_accused() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
         let logs: Vec<PathBuf> = (0..12).map(|i| folder.join(format!("set-{i:03}"))).collect();
-        let table = run(&logs).unwrap();
+        let table = run(&logs, String::new()).unwrap();
         assert!(table.accused.is_empty(), "{:?}", table.accused);
         for row in &table.rows {
             assert!(row.visible > 0, "{row:?}");

@@ -213,7 +213,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             }
         }
         What::LogCheck { logs, json } => {
-            let table = log_faults::run(logs)?;
+            let table = log_faults::run(logs, scenario::commit(&root))?;
             program::show(&if *json { table.json()? + "\n" } else { table.markdown() });
         }
         What::Accuracy { write, set } => {

@@ -5,7 +5,7 @@
 //! rows are spaced; what is left of motion, such as impacts, is in few of them, so that the lower quartile of their sizes is the noise's. Where the tool rests
 //! before it first moves nothing moves at all: those rows are enough where there are many.
 
-use measured_log::{Channel, Episode, Log, Noise};
+use measured_log::{Channel, Component, Episode, Log, Noise};
 use nalgebra::UnitQuaternion;
 use serde::Serialize;
 
@@ -19,6 +19,9 @@ const MEDIAN_SHARE: f64 = 0.674_489_75;
 const AT_REST: usize = 100;
 /// A given standard deviation that differs from what readings scatter by more than this factor is told.
 const CONTRADICTS: f64 = 3.0;
+
+/// Scatter below so many steps of the readings is that of their rounding.
+const STEPS: f64 = 3.0;
 
 /// Where a standard deviation comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -43,7 +46,7 @@ pub struct SensorNoise {
     pub stddev: f64,
     /// Where it comes from.
     pub source: Source,
-    /// What readings scatter by, if enough of them do.
+    /// What readings scatter by, if enough of them do, and, beside a given noise, by more than their steps.
     pub scatter: Option<f64>,
 }
 
@@ -93,6 +96,11 @@ impl NoiseLevels {
                 (None, Some(scatter)) if scatter > smallest(kind) => (scatter, Source::Estimated),
                 (None, _) => (smallest(kind), Source::Floor),
             };
+            // What rounding makes of a reading contradicts nothing.
+            let fine = |scatter: &f64| {
+                source != Source::Given || step(log, kind, joints).is_none_or(|step| *scatter > STEPS * step)
+            };
+            let scatter = scatter.filter(fine);
             Some(SensorNoise { channel: kind, unit: kind.unit(), stddev, source, scatter })
         }))
     }
@@ -173,6 +181,22 @@ fn scatter(log: &Log, kind: Kind, joints: usize) -> Option<Option<f64>> {
         }
     }
     any.then(|| if resting.len() >= AT_REST { size(resting) } else { size(all) })
+}
+
+/// The smallest step between readings of a kind that follow each other; `None` where none differ.
+fn step(log: &Log, kind: Kind, joints: usize) -> Option<f64> {
+    let channels = if kind == Kind::ObjectOrientation {
+        Component::ALL.map(Channel::ObjectOrientation).to_vec()
+    } else {
+        kind.channels(joints)
+    };
+    let columns =
+        log.episodes.iter().flat_map(|episode| channels.iter().filter_map(|channel| episode.channels.get(channel)));
+    let steps = columns.flat_map(|readings| {
+        let read: Vec<f64> = readings.iter().flatten().collect();
+        read.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect::<Vec<f64>>()
+    });
+    steps.min_by(f64::total_cmp)
 }
 
 /// When the tool first moves, s; before any row where it is not commanded.

@@ -162,7 +162,7 @@ pub struct Report {
     pub fold: Option<[usize; 2]>,
     /// Episodes of the log that cannot be simulated: without a pose of the object, or without a row after it.
     pub left_out: Vec<u64>,
-    /// Simulated episodes.
+    /// Simulated episodes of the search; what [`Self::warn`] simulates is not counted.
     pub rollouts: usize,
     /// Duration, s.
     pub seconds: f64,
@@ -250,16 +250,16 @@ impl Report {
     /// Adds what the log's own readings say against it, and numbers given as exact that would explain as much as what was found.
     pub fn warn(&mut self, log: &Log, nominal: &Nominal) {
         self.warnings = warnings(log, nominal, &check(log, nominal.tool()), self.seed);
-        if self.verdict != Verdict::None {
-            let errors = [self.heldout.before, self.heldout.after];
-            self.warnings.extend(held_fixed(log, nominal, errors, self.seed));
-        }
         // What is wrong with a log is no effect, and no experiment tells more before it is mended.
         let mends = |warning: &Warning| warning.heldout.is_some_and(|[before, after]| after < MENDS * before);
         if self.warnings.iter().any(mends) {
             self.next_experiment =
                 "Mend the log first, as \"Check the log\" says, and diagnose it again: `cargo xtask log check LOG --fix COPY` writes a mended copy."
                     .into();
+        }
+        if self.verdict != Verdict::None {
+            let errors = [self.heldout.before, self.heldout.after];
+            self.warnings.extend(held_fixed(log, nominal, errors, self.seed));
         }
     }
 

@@ -1,6 +1,6 @@
 //! What a log's own readings say against it, beside what simulations say of it.
 
-use log_check::{Check, Kind, Suspicion};
+use log_check::{Check, Kind, Suspicion, capital};
 use measured_log::{Log, Number};
 use physics_model::rig::RigTool;
 use serde::Serialize;
@@ -37,13 +37,7 @@ pub fn check(log: &Log, tool: &RigTool) -> Check {
         .all()
         .filter_map(|noise| {
             let scatter = noise.scatter.filter(|_| noise.source == Source::Given)?;
-            // What a coarse step makes of a reading is no scatter.
-            let columns = noise.channel.channels(usize::from(log.header.robot.joints()));
-            let column = columns.first().map_or_else(|| "object_qx".into(), |channel| channel.name());
-            let step =
-                check.sensors.iter().find(|sensor| sensor.column == column).and_then(|sensor| sensor.smallest_step);
-            let coarse = step.is_some_and(|step| scatter < 3.0 * step);
-            (noise.contradicts() && !coarse).then(|| {
+            noise.contradicts().then(|| {
                 let (name, unit) = (noise.channel.name(), noise.unit);
                 let found = format!(
                     "log.toml gives {name} a noise of {:.2e} {unit}, its readings scatter by {scatter:.2e}.",
@@ -79,19 +73,13 @@ pub fn warnings(log: &Log, nominal: &Nominal, check: &Check, seed: u64) -> Vec<W
             let proof = heldout.zip(reading).map(|([before, after], reading)| {
                 format!(
                     " {}, the held-out error goes from {before:.3} to {after:.3} before anything is re-tuned.",
-                    reading.words()
+                    capital(&reading.words())
                 )
             });
-            let sentence = suspicion.sentence() + &proof.map(|proof| capital_after_space(&proof)).unwrap_or_default();
+            let sentence = suspicion.sentence() + &proof.unwrap_or_default();
             Warning { kind: suspicion.kind, sentence, heldout }
         })
         .collect()
-}
-
-/// With the letter after a first space in upper case.
-fn capital_after_space(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().into_iter().chain(letters.next().into_iter().flat_map(char::to_uppercase)).chain(letters).collect()
 }
 
 /// Numbers given as exact that, given a spread, would explain as much as what was found: `before` and `after` are the held-out errors of the answer.

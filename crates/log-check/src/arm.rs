@@ -1,11 +1,11 @@
 //! Whether joints and tool fit together.
 
-use measured_log::{Channel, Episode, Log};
+use measured_log::{Axis, Channel, Episode, Log};
 use nalgebra::Vector3;
 use physics_model::robot::Robot;
 
 use crate::Reading;
-use crate::suspicion::{Kind, Suspicion};
+use crate::suspicion::{Kind, Suspicion, capital};
 
 /// Rows that are looked at, spread over the log.
 const ROWS: usize = 400;
@@ -21,11 +21,11 @@ pub(crate) fn joints(episode: &Episode, count: u8, row: usize) -> Option<Vec<f64
 
 /// Where the tool centre is in a row: as measured, else by the joints, else as commanded.
 pub(crate) fn tool_m(log: &Log, arm: Option<&Robot>, episode: &Episode, row: usize) -> Option<[f64; 3]> {
-    if episode.channels.contains_key(&Channel::Tool(measured_log::Axis::X)) {
+    if log.has(Channel::Tool(Axis::X)) {
         return episode.vector(Channel::Tool, row);
     }
     if let Some(arm) = arm
-        && episode.channels.contains_key(&Channel::Joint(0))
+        && log.has(Channel::Joint(0))
     {
         let q = joints(episode, log.header.robot.joints(), row)?;
         return Some(arm.base_from_tool(&q).translation.vector.into());
@@ -36,9 +36,7 @@ pub(crate) fn tool_m(log: &Log, arm: Option<&Robot>, episode: &Episode, row: usi
 /// Joints beside measured, else commanded, places of the tool.
 pub(crate) fn suspicion(log: &Log, arm: &Robot) -> Option<Suspicion> {
     let count = log.header.robot.joints();
-    let has = |c: Channel| log.episodes.first().is_some_and(|episode| episode.channels.contains_key(&c));
-    let place: fn(measured_log::Axis) -> Channel =
-        if has(Channel::Tool(measured_log::Axis::X)) { Channel::Tool } else { Channel::Command };
+    let place: fn(Axis) -> Channel = if log.has(Channel::Tool(Axis::X)) { Channel::Tool } else { Channel::Command };
     let all: Vec<(Vec<f64>, Vector3<f64>)> = log
         .episodes
         .iter()
@@ -109,10 +107,4 @@ fn offset(joint: u8, rows: &[&(Vec<f64>, Vector3<f64>)], arm: &Robot) -> Option<
         if off(a) < off(b) { high = b } else { low = a }
     }
     Some(0.5 * (low + high))
-}
-
-/// With its first letter in upper case.
-pub(crate) fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

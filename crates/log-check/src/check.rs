@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use physics_model::robot::{Robot, ToolShape};
 use serde::Serialize;
 
-use crate::arm::{self, capital};
+use crate::arm;
 use crate::geometry::{self, Fit, Tool};
 use crate::motion::Motions;
 use crate::sensors::{self, Clock, Sensor};
@@ -24,6 +24,8 @@ const AS_GOOD: f64 = 0.1;
 const COSINE_GAIN: f64 = 0.5;
 const LEAST_COSINE: f64 = 0.6;
 const COSINE_ERRORS: f64 = 4.0;
+/// Readings within this of each other are as good.
+const COSINE_SAME: f64 = 0.02;
 /// Forces that pull by this much are reversed, however much else turns them.
 const LEAST_REVERSED: f64 = 0.2;
 /// Share of onsets at which tool and object meet under the reading that is offered.
@@ -84,7 +86,7 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
     if !turned {
         suspicions.extend(contacts.lever().and_then(|lever| of_lever(lever, reach_m)));
     }
-    if forces.is_none() && has(log, Channel::WristForce(measured_log::Axis::X)) {
+    if forces.is_none() && log.has(Channel::WristForce(measured_log::Axis::X)) {
         not_told.push(
             "sign, axes and unit of the wrench: too few readings of forces where tool and object are known to touch"
                 .into(),
@@ -92,10 +94,6 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
     }
     suspicions.sort_by_key(|suspicion| suspicion.kind);
     Check { sensors, clock, fit, forces, suspicions, not_told }
-}
-
-fn has(log: &Log, channel: Channel) -> bool {
-    log.episodes.first().is_some_and(|episode| episode.channels.contains_key(&channel))
 }
 
 /// What touches: the ball of the log, or what of the hand can touch.
@@ -240,44 +238,25 @@ fn not_told(log: &Log, own: &Fit, motions: &Motions, same: &[Reading]) -> Vec<St
 
 fn of_axes(contacts: &Contacts, own: Option<Forces>) -> Option<Suspicion> {
     let own = own?;
-    if own.cosine < -LEAST_REVERSED && own.cosine < -COSINE_ERRORS * own.error {
-        return Some(reversed(contacts, own));
-    }
     let mut all: Vec<(Reading, Forces)> =
         wrench::axes().into_iter().filter_map(|reading| Some((reading, contacts.forces(Some(&reading))?))).collect();
-    let best = all.iter().map(|(_, forces)| forces.cosine).fold(f64::NEG_INFINITY, f64::max);
-    let error = own.error.hypot(all.iter().find(|(_, forces)| forces.cosine == best)?.1.error);
-    if best - own.cosine < COSINE_GAIN.max(COSINE_ERRORS * error) || best < LEAST_COSINE {
+    let best = all.iter().max_by(|a, b| a.1.cosine.total_cmp(&b.1.cosine))?.1;
+    // Forces that pull where they should push have the wrong sign, whatever else turns them: another reading has to be better by far.
+    let pull = own.cosine < -LEAST_REVERSED && own.cosine < -COSINE_ERRORS * own.error;
+    let clear = best.cosine - own.cosine >= COSINE_GAIN.max(COSINE_ERRORS * own.error.hypot(best.error));
+    if !pull && !(clear && best.cosine >= LEAST_COSINE) {
         return None;
     }
+    let margin = if pull { COSINE_GAIN } else { COSINE_SAME };
     // The order is that of how common they are.
-    all.retain(|(_, forces)| forces.cosine > best - 0.02);
-    let ways: Vec<String> = all.iter().take(3).map(|(reading, _)| reading.words()).collect();
-    let mend = format!("It is {:.0}° {}.", angle(all.first()?.1.cosine), ways.join(", or "));
+    let (first, with) = *all.iter().find(|(_, forces)| forces.cosine > best.cosine - margin)?;
+    all.retain(|(reading, forces)| *reading != first && forces.cosine > with.cosine - COSINE_SAME);
+    let readings: Vec<Reading> = std::iter::once(first).chain(all.into_iter().map(|(reading, _)| reading)).collect();
+    let ways: Vec<String> = readings.iter().take(3).map(Reading::words).collect();
+    let mend = format!("It is {:.0}° {}.", angle(with.cosine), ways.join(", or "));
     let mut suspicion = Suspicion::new(Kind::WrenchAxes, aside(own), &mend);
-    suspicion.readings = all.into_iter().map(|(reading, _)| reading).collect();
+    suspicion.readings = readings;
     Some(suspicion)
-}
-
-/// Forces that pull where they should push: whatever else turns them, their sign is wrong, or their axes are.
-fn reversed(contacts: &Contacts, own: Forces) -> Suspicion {
-    let reading = Reading::Wrench(wrench::REVERSED);
-    let then = contacts.forces(Some(&reading)).map_or(1.0, |forces| forces.cosine);
-    let others: Vec<Reading> = wrench::axes()
-        .into_iter()
-        .skip(1)
-        .filter(|other| contacts.forces(Some(other)).is_some_and(|forces| forces.cosine > then - 0.02))
-        .collect();
-    let better = others
-        .iter()
-        .find(|other| contacts.forces(Some(other)).is_some_and(|forces| forces.cosine > then + COSINE_GAIN));
-    let first = better.copied().unwrap_or(reading);
-    let with = contacts.forces(Some(&first)).map_or(then, |forces| forces.cosine);
-    let also = if better.is_none() { others.first().map(|other| format!(", or {}", other.words())) } else { None };
-    let mend = format!("It is {:.0}° {}{}.", angle(with), first.words(), also.unwrap_or_default());
-    let mut suspicion = Suspicion::new(Kind::WrenchAxes, aside(own), &mend);
-    suspicion.readings = std::iter::once(first).chain(others.into_iter().filter(|other| *other != first)).collect();
-    suspicion
 }
 
 fn aside(own: Forces) -> String {
@@ -338,13 +317,13 @@ fn of_lever(lever: Lever, reach_m: f64) -> Option<Suspicion> {
         1e3 * reach_m
     );
     let (mend, reading) = if far {
-        ("Are they in N·mm?".into(), Reading::TorqueScaled(1e-3))
+        ("Are they in N·mm?".to_owned(), Reading::TorqueScaled(1e-3))
     } else {
         let mend =
             format!("They are about a point at ({x:.3}, {y:.3}, {z:.3}) m from the tool's centre, such as the wrist.");
         (mend, Reading::TorqueAbout(lever.at_m))
     };
-    let mut suspicion = Suspicion::new(Kind::TorquePoint, found, &capital(&mend));
+    let mut suspicion = Suspicion::new(Kind::TorquePoint, found, &mend);
     suspicion.readings.push(reading);
     Some(suspicion)
 }

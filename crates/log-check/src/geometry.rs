@@ -86,12 +86,8 @@ pub(crate) fn posed(reading: Option<&Reading>, solid: &Solid, pose: &Isometry3<f
 pub(crate) fn sized(reading: Option<&Reading>, shape: &Shape, tool: &Tool) -> (Solid, Tool) {
     let (mut shape, mut tool) = (shape.clone(), tool.clone());
     if let Some(reading) = reading {
-        reading.sizes(&mut shape, &mut None);
-        for (_, radius_m) in &mut tool.balls {
-            let mut radius = Some(*radius_m);
-            reading.sizes(&mut Shape::Sphere { radius_m: 1.0.into() }, &mut radius);
-            *radius_m = radius.unwrap_or(*radius_m);
-        }
+        reading.shape(&mut shape);
+        tool.balls.iter_mut().for_each(|(_, radius_m)| *radius_m = reading.tool_radius_m(*radius_m));
     }
     (Solid::new(&shape), tool)
 }

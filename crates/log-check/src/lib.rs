@@ -33,5 +33,5 @@ pub use check::{Check, check};
 pub use geometry::{Fit, Rest, Touch};
 pub use reading::Reading;
 pub use sensors::{Clock, Sensor, without_dead};
-pub use suspicion::{Kind, Suspicion};
+pub use suspicion::{Kind, Suspicion, capital};
 pub use wrench::{Forces, Lever};

@@ -50,8 +50,7 @@ pub(crate) struct Motions {
 impl Motions {
     /// Of a log whose object is `size_m` wide. `tool` gives the tool centre of a row.
     pub(crate) fn new(log: &Log, size_m: f64, tool: impl Fn(&Episode, usize) -> Option<[f64; 3]>) -> Self {
-        let has = |c: Channel| log.episodes.first().is_some_and(|episode| episode.channels.contains_key(&c));
-        let turns = has(Channel::ObjectOrientation(measured_log::Component::W));
+        let turns = log.has(Channel::ObjectOrientation(measured_log::Component::W));
         let all: Vec<(u64, Vec<Seen>)> =
             log.episodes.iter().map(|episode| (episode.id, seen(episode, turns, &tool))).collect();
         let steps = |size: fn(&Seen, &Seen) -> f64| {

@@ -16,7 +16,7 @@ pub enum Reading {
     RealFirst,
     /// Both.
     ConjugateRealFirst,
-    /// The columns of the quaternion hold y, z, w, x: w, x, y, z was taken for x, y, z, w, once more.
+    /// The columns of the quaternion hold y, z, w, x: undoes [`Self::RealFirst`], and makes such a log of a good one.
     RealLast,
     /// Object poses are in a frame turned about z by so many quarters.
     TrackerTurned(u8),
@@ -182,22 +182,27 @@ impl Reading {
         }
     }
 
-    /// The object's shape and the tool's radius, as they are then.
-    pub(crate) fn sizes(&self, shape: &mut Shape, tool_radius_m: &mut Option<f64>) {
+    /// The object's shape, as it is then.
+    pub(crate) fn shape(&self, shape: &mut Shape) {
         match (self, shape) {
             (Self::LengthsSwapped(a, b), Shape::Box { size_m }) => size_m.swap(*a, *b),
             (Self::LengthsScaled(factor), shape) => scale(shape, *factor, *factor),
             (Self::RadiusScaled(factor), shape) => scale(shape, *factor, 1.0),
-            (Self::ToolRadiusScaled(factor), _) => *tool_radius_m = tool_radius_m.map(|radius| radius * factor),
             _ => {}
         }
+    }
+
+    /// The tool's radius, as it is then, m.
+    pub(crate) fn tool_radius_m(&self, radius_m: f64) -> f64 {
+        if let Self::ToolRadiusScaled(factor) = self { factor * radius_m } else { radius_m }
     }
 
     /// The log that says so in the format's own terms.
     #[must_use]
     pub fn apply(&self, log: &Log) -> Log {
         let mut log = log.clone();
-        self.sizes(&mut log.header.object.shape, &mut log.header.tool_radius_m);
+        self.shape(&mut log.header.object.shape);
+        log.header.tool_radius_m = log.header.tool_radius_m.map(|radius_m| self.tool_radius_m(radius_m));
         if let Self::TableAt(height_m) = self {
             let stddev = log.header.table.height_m.stddev();
             log.header.table.height_m =

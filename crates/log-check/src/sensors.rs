@@ -75,10 +75,7 @@ fn groups(log: &Log) -> Vec<Vec<Channel>> {
         vector(Channel::ObjectSpin),
         vec![Channel::AddedMass],
     ];
-    let has = |group: &Vec<Channel>| {
-        group.first().is_some_and(|c| log.episodes.first().is_some_and(|episode| episode.channels.contains_key(c)))
-    };
-    all.into_iter().filter(has).collect()
+    all.into_iter().filter(|group| group.first().is_some_and(|channel| log.has(*channel))).collect()
 }
 
 /// Readings of a column with the indices of their rows.
@@ -234,8 +231,8 @@ fn of_clock(log: &Log, clock: &Clock) -> Option<Suspicion> {
 /// How many times smoother the tool, else the object, moves by the number of its reading than by its time: the median distance of a place from the line between
 /// its neighbours, where these are apart.
 fn evenly(log: &Log) -> Option<f64> {
-    let has = |c: Channel| log.episodes.first().is_some_and(|episode| episode.channels.contains_key(&c));
-    let place: fn(Axis) -> Channel = if has(Channel::Tool(Axis::X)) { Channel::Tool } else { Channel::ObjectPosition };
+    let place: fn(Axis) -> Channel =
+        if log.has(Channel::Tool(Axis::X)) { Channel::Tool } else { Channel::ObjectPosition };
     let (mut ways, mut by_time, mut by_row) = (Vec::new(), Vec::new(), Vec::new());
     for episode in &log.episodes {
         let read: Vec<(f64, [f64; 3])> =
@@ -308,7 +305,7 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64) -> bool) -> Op
     sizes.sort_by(|a, b| b.total_cmp(a));
     // But for a few.
     let beyond = BEYOND * sizes.get(FEW).copied()?;
-    // Whatever it is, half of all neighbours differ by less.
+    // Nine in ten of all neighbours differ by less.
     let steps = |episode: &Episode, channel: Channel| -> Vec<f64> {
         let read: Vec<f64> = readings(episode, channel).map(|(_, value)| value).collect();
         read.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect()

@@ -70,3 +70,10 @@ impl Suspicion {
         format!("{}{at} {}", self.found, self.mend)
     }
 }
+
+/// With its first letter in upper case.
+#[must_use]
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}

@@ -145,7 +145,7 @@ pub(crate) fn axes() -> Vec<Reading> {
 }
 
 /// What the tool exerts on the world.
-pub(crate) const REVERSED: [(u8, i8); 3] = [(0, -1), (1, -1), (2, -1)];
+const REVERSED: [(u8, i8); 3] = [(0, -1), (1, -1), (2, -1)];
 
 /// Whether axes are right-handed.
 fn is_turn(axes: &[(u8, i8); 3]) -> bool {

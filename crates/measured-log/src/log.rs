@@ -74,6 +74,12 @@ impl Episode {
 }
 
 impl Log {
+    /// Whether it has a column: all episodes have the same.
+    #[must_use]
+    pub fn has(&self, channel: Channel) -> bool {
+        self.episodes.first().is_some_and(|episode| episode.channels.contains_key(&channel))
+    }
+
     /// Whether it is a valid log.
     ///
     /// # Errors

@@ -100,6 +100,7 @@ class Answers(unittest.TestCase):
         self.assertEqual([effect.name for effect in DIAGNOSIS.effects], [e["name"] for e in report["effects"]])
         self.assertEqual([cell.share for cell in DIAGNOSIS.located], [c["share"] for c in report["located"]])
         self.assertEqual(DIAGNOSIS.heldout.before, report["heldout"]["before"])
+        self.assertEqual(len(DIAGNOSIS.warnings), len(report["warnings"]))
         self.assertEqual(DIAGNOSIS.confusion_set, report["confusion_set"])
         frame = DIAGNOSIS.to_pandas()
         self.assertEqual(len(frame), sum(len(e["parameters"]) for e in report["effects"]))

@@ -103,6 +103,11 @@ class Diagnosis:
         return Heldout(**{key: self.report["heldout"][key] for key in Heldout.__dataclass_fields__})
 
     @property
+    def warnings(self) -> list[str]:
+        """What the log's own readings say against it, and what against the answer: to be read first."""
+        return [warning["sentence"] for warning in self.report["warnings"]]
+
+    @property
     def next_experiment(self) -> str:
         """What to record next."""
         return self.report["next_experiment"]
