@@ -244,7 +244,7 @@ fn of_axes(contacts: &Contacts, own: Option<Forces>) -> Option<Suspicion> {
     // Forces that pull where they should push have the wrong sign, whatever else turns them: another reading has to be better by far.
     let pull = own.cosine < -LEAST_REVERSED && own.cosine < -COSINE_ERRORS * own.error;
     let clear = best.cosine - own.cosine >= COSINE_GAIN.max(COSINE_ERRORS * own.error.hypot(best.error));
-    if !pull && !(clear && best.cosine >= LEAST_COSINE) {
+    if !(pull || clear && best.cosine >= LEAST_COSINE) {
         return None;
     }
     let margin = if pull { COSINE_GAIN } else { COSINE_SAME };
