@@ -9,7 +9,8 @@ python tests/peers/pytorch_prior.py prints its versions and answers one JSON obj
     {"do": "step", "calls": N, "compile": false}    one observation in, one mixture out: microseconds of CPU time a call, variant by variant
     {"do": "outputs", "ours": FILE}                 largest difference of our outputs for the observations in FILE, step by step
 
-python tests/peers/pytorch_prior.py --reference FILE writes a small network with its loss and gradient in f64, which tests read.
+python tests/peers/pytorch_prior.py --reference FILE writes a small network with its loss and gradient in f64, which tests read;
+--optimiser FILE writes steps of Adam and AdamW.
 Exits with status 3 and says what is missing where PyTorch is not installed. Times are CPU time of the process.
 """
 
@@ -314,6 +315,37 @@ def reference(path):
         file.write("\n")
 
 
+def optimiser(path):
+    """Forty steps of Adam and AdamW in f64, with rates that fall and gradients of very different sizes."""
+    generator = torch.Generator().manual_seed(2)
+    rates = [0.01 * (1.0 - step / 50) for step in range(40)]
+    start = torch.round(torch.randn(6, generator=generator) * 256).double() / 256
+    scales = torch.tensor([1.0, 1e-3, 30.0, 0.1, 1.0, 1.0], dtype=torch.float64)
+    # Exact in f32, so that both begin with the same numbers.
+    gradients = [(torch.randn(6, generator=generator).double() * scales).float().double() for _ in rates]
+    decay, paths = 0.1, {}
+    for name, kind, options in (("adam", torch.optim.Adam, {}), ("adamw", torch.optim.AdamW, {"weight_decay": decay})):
+        weights = start.clone().requires_grad_()
+        adam = kind([weights], lr=rates[0], eps=1e-8, **options)
+        paths[name] = []
+        for rate, gradient in zip(rates, gradients):
+            adam.param_groups[0]["lr"] = rate
+            weights.grad = gradient.clone()
+            adam.step()
+            paths[name].append(weights.detach().tolist())
+    result = {
+        "written_by": f"tests/peers/pytorch_prior.py --optimiser, PyTorch {torch.__version__}",
+        "rates": rates,
+        "weight_decay": decay,
+        "start": start.tolist(),
+        "gradients": [gradient.tolist() for gradient in gradients],
+        **paths,
+    }
+    with open(path, "w") as file:
+        json.dump(result, file, indent=None, separators=(",", ":"))
+        file.write("\n")
+
+
 def answer(problem, request):
     what = request.pop("do")
     if what == "open":
@@ -333,6 +365,9 @@ def main():
     if sys.argv[1:2] == ["--reference"]:
         torch.set_num_threads(1)
         reference(sys.argv[2])
+        return
+    if sys.argv[1:2] == ["--optimiser"]:
+        optimiser(sys.argv[2])
         return
     print(json.dumps({"torch": torch.__version__, "numpy": numpy.__version__, "python": sys.version.split()[0]}), flush=True)
     problem = None

@@ -7,9 +7,18 @@ use std::process::Command;
 use end_to_end::{files, root, stderr};
 use serde_json::Value;
 
-/// Packages with programs that do not train.
-const LIGHT: [&str; 7] =
-    ["datagen", "diagnose-benchmark", "discrepancy", "experiments", "import-log", "report", "scenario"];
+/// Packages with programs.
+const WITH_PROGRAMS: [&str; 9] = [
+    "bench",
+    "datagen",
+    "diagnose-benchmark",
+    "discrepancy",
+    "experiments",
+    "import-log",
+    "prior",
+    "report",
+    "scenario",
+];
 
 /// What cargo prints.
 fn cargo(arguments: &[&str]) -> String {
@@ -72,18 +81,9 @@ fn crates_use_only_what_the_architecture_table_says() {
     }
 }
 
+/// `cargo xtask` builds a program with `report` and `measured-log` beside it: what such programs share must be compiled once.
 #[test]
-fn only_the_prior_and_what_needs_it_link_burn() {
-    for (name, dependencies) in members() {
-        let links = dependencies.iter().any(|dependency| dependency == "burn");
-        assert_eq!(links, name == "prior", "{name}");
-    }
-}
-
-/// `cargo xtask` builds a program with `report` and `measured-log` beside it: what such programs share must be compiled once, and burn, which takes most of
-/// a cold build, not at all. Those that train are apart.
-#[test]
-fn programs_that_are_built_one_by_one_share_their_dependencies_and_do_without_burn() {
+fn programs_that_are_built_one_by_one_share_their_dependencies() {
     /// Crates with the choices of features that they are compiled with.
     type Tree = BTreeMap<String, BTreeSet<String>>;
     let tree = |program: &str| -> Tree {
@@ -98,9 +98,8 @@ fn programs_that_are_built_one_by_one_share_their_dependencies_and_do_without_bu
         tree
     };
     let base = tree("report");
-    for program in LIGHT {
+    for program in WITH_PROGRAMS {
         let some = tree(program);
-        assert!(!some.keys().any(|name| name.starts_with("burn")), "{program} compiles burn");
         for (name, features) in &base {
             assert_eq!(some.get(name), Some(features), "{name}, with {program}");
         }

@@ -7,7 +7,7 @@ use std::process::{Command, ExitCode};
 use anyhow::{Context as _, Result};
 
 /// Selected with every program, and built only where it needs them: with these two, cargo chooses the same features for what programs share, and compiles it
-/// once; `tests/suite/architecture.rs` holds that. Those that train bring burn, with other features, and compile it all once more.
+/// once; `tests/suite/architecture.rs` holds that.
 const ALWAYS: [&str; 2] = ["report", "import-log"];
 
 /// Says that all programs are built together, as CI does: then they are built so again, which takes no time, and not one by one with other

@@ -16,7 +16,7 @@ use std::time::Instant;
 
 use anyhow::{Context as _, Result, ensure};
 use prior::fused::{Batch, Workspace};
-use prior::{Dimensions, GradientPath, Inference, Parameters, Sequence};
+use prior::{Dimensions, Inference, Parameters, Sequence};
 use rayon::ThreadPool;
 use serde_json::{Map, Value, json};
 
@@ -142,15 +142,7 @@ fn batches(
     note: &mut impl FnMut(&str),
 ) -> Result<Value> {
     let pool = threads(1)?;
-    let paths = [
-        ("fused", GradientPath::Fused, 4),
-        ("fused_one_chunk", GradientPath::Fused, 1),
-        ("autodiff", GradientPath::Autodiff, 4),
-    ];
-    let mut ours = Vec::new();
-    for (name, gradient, chunks) in paths {
-        ours.push((name, problem.trainer(gradient, chunks)?));
-    }
+    let mut ours = [("fused", problem.trainer(4)?), ("fused_one_chunk", problem.trainer(1)?)];
     if let Some(peer) = peer.as_deref_mut() {
         problem.write(&folder.join("synthetic"), ours[0].1.parameters(), effort.rounds + 1)?;
         peer.ask(&json!({ "do": "open", "folder": "synthetic", "threads": 1 }))?;
@@ -196,7 +188,7 @@ fn steps(
     note: &mut impl FnMut(&str),
 ) -> Result<Value> {
     let sizes = Dimensions::new(&problem.config.network, &problem.layout)?;
-    let trainer = problem.trainer(GradientPath::Fused, 1)?;
+    let trainer = problem.trainer(1)?;
     let mut inference = Inference::new(&sizes, &problem.normalisation(), trainer.parameters());
     let rows: Vec<Vec<f64>> = problem.data[0]
         .observations
@@ -268,7 +260,7 @@ fn epochs(
     note: &mut impl FnMut(&str),
 ) -> Result<Value> {
     let (training, held_out) = (problem.part(false).len(), problem.part(true).len());
-    let first = problem.trainer(GradientPath::Fused, problem.config.chunks)?;
+    let first = problem.trainer(problem.config.chunks)?;
     if let Some(peer) = peer.as_deref_mut() {
         problem.write(&folder.join("recorded"), first.parameters(), effort.rounds)?;
         peer.ask(&json!({ "do": "open", "folder": "recorded", "threads": 1 }))?;
@@ -279,12 +271,12 @@ fn epochs(
     let mut weights: Vec<Parameters<f32>> = Vec::new();
     for count in [1, 2] {
         let pool = threads(count)?;
-        let mut trainer = problem.trainer(GradientPath::Fused, problem.config.chunks)?;
+        let mut trainer = problem.trainer(problem.config.chunks)?;
         if let Some(peer) = peer.as_deref_mut() {
             peer.ask(&json!({ "do": "open", "folder": "recorded", "threads": count }))?;
         }
         // The same sums in another order: how far rounding alone drives two trainings apart.
-        let mut twin = if count == 1 { Some(problem.trainer(GradientPath::Fused, 1)?) } else { None };
+        let mut twin = if count == 1 { Some(problem.trainer(1)?) } else { None };
         let mut times: BTreeMap<&str, Series> = BTreeMap::new();
         let mut curves = Curves::default();
         for round in 1..=effort.rounds {
@@ -436,7 +428,6 @@ pub fn table(result: &Value) -> String {
         cell(&batch["ratio"], 2)
     );
     text += &format!("| the same in one chunk | {} | | |\n", cell(&batch["fused_one_chunk_ms"], 1));
-    text += &format!("| the same by burn's autodiff | {} | | |\n", cell(&batch["autodiff_ms"], 1));
     text += &format!("| the same without the mixture loss | | {} | |\n", cell(&batch["pytorch_network_alone_ms"], 1));
     text += &format!(
         "| inference step, µs | {} | {} | {} |\n",

@@ -169,7 +169,7 @@ impl Checkpoint {
     }
 }
 
-#[cfg(all(test, feature = "training"))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::train::Trainer;

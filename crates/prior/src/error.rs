@@ -199,14 +199,6 @@ pub enum Error {
         /// Norm found.
         norm: f64,
     },
-    /// burn could not write or read its optimiser state.
-    #[error("{}: optimiser state: {reason}", path.display())]
-    Optimizer {
-        /// File.
-        path: PathBuf,
-        /// burn's message.
-        reason: String,
-    },
 }
 
 impl Error {

@@ -10,7 +10,6 @@
 //! rest has velocity exactly 0, and without a resolution the density could grow there without bound. Noise of the size
 //! of the resolution is added to the targets, so a calibrated network states at least that spread.
 
-#[cfg(feature = "training")]
 mod episodes;
 
 use physics_model::state::BODY_LEN;
@@ -24,7 +23,6 @@ use push_task::{Action, Particle, PushModel};
 use crate::mixture::Draw;
 use crate::{ClassTarget, Layout, Transform};
 
-#[cfg(feature = "training")]
 pub use episodes::{first_event, layout_of_dataset, sequence};
 
 /// A suggested body that leans less than this stands upright, rad.
@@ -214,7 +212,7 @@ fn settle(body: &mut BodyState, shape: ObjectShape, size_m: [f64; 3], table_heig
     }
 }
 
-#[cfg(all(test, feature = "training"))]
+#[cfg(test)]
 mod tests {
     use push_task::config::ForceSensing;
 

@@ -1,8 +1,8 @@
 //! Loss and gradient by hand: backpropagation through time on packed batches and the `gemm` crate.
 //!
-//! burn's autodiff records about a hundred small operations a time step; this path needs two products a step and layer
-//! and otherwise only element-wise operations. It works on plain vectors and is generic over f32 (training) and f64
-//! (finite differences). A test holds it to the gradients of [`crate::network`].
+//! Two products a step and layer, and otherwise only element-wise operations; automatic differentiation would record about a hundred small
+//! operations for each. It works on plain vectors and is generic over f32 (training) and f64 (tests). Tests hold it to
+//! finite differences and to the loss and gradient that PyTorch recorded.
 //!
 //! On one kind of CPU the same seed gives the same bytes for any number of threads. `gemm` picks its kernels by the
 //! CPU's vector units (FMA, AVX-512), so another kind of CPU rounds differently.
@@ -180,3 +180,6 @@ fn rows<T>(sizes: &Dimensions, row: &mut head::Row<T>, outputs: &mut [T], batch:
     total
 }
 }
+
+#[cfg(test)]
+mod tests;

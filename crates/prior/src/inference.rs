@@ -238,18 +238,17 @@ fn log_softmax(logits: &[f32], target: &mut [f64]) {
     target.iter_mut().zip(logits).for_each(|(target, &logit)| *target = f64::from(logit) - shift);
 }
 
-#[cfg(all(test, feature = "training"))]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::Sequence;
-    use crate::network::{Network, Padded, device};
+    use crate::fused::{Batch, Workspace};
     use crate::parameters::tests::dimensions;
-    use burn::tensor::Tensor;
     use pomdp::{Purpose, Seed};
     use rand::RngExt as _;
 
     #[test]
-    fn steps_equal_burns_forward_pass_and_a_reset_starts_afresh() {
+    fn steps_equal_the_forward_pass_of_training_and_a_reset_starts_afresh() {
         let sizes = dimensions(6, 5, &[3, 4], &[13, 9], 4);
         let parameters = Parameters::initial(&sizes, Seed(2));
         let scale = |index: usize| Scale { mean: 0.3 * index as f64, stddev: 1.0 + index as f64 };
@@ -264,10 +263,11 @@ mod tests {
             steps,
         };
         let normalised = normalisation.apply(&sequence);
-        let (device, padded) = (device(), Padded::new(&[&normalised], &sizes, &device()));
-        let network = Network::new(&parameters, &sizes, &device);
-        let reference = Tensor::cat(network.forward(&padded, None), 1).into_data();
-        let reference = reference.try_into_vec::<f32>().unwrap();
+        let batch = Batch::<f64>::pack(&[&normalised], &sizes);
+        let mut training = Workspace::new(&sizes);
+        let exact = parameters.map(f64::from);
+        let loss = training.loss(&exact, &batch) / steps as f64;
+        let reference = training.outputs(&exact, &batch);
         let mut inference = Inference::new(&sizes, &normalisation, &parameters);
         for round in 0..2 {
             let mut log_density = 0.0;
@@ -279,10 +279,9 @@ mod tests {
                 log_density += inference.step(&row).log_density_masked(&targets, &mask, &classes);
                 let expected = &reference[step * sizes.outputs()..][..sizes.outputs()];
                 for (ours, theirs) in inference.raw_outputs().iter().zip(expected) {
-                    assert!((ours - theirs).abs() < 1e-5, "round {round}, step {step}: {ours} {theirs}");
+                    assert!((f64::from(*ours) - theirs).abs() < 1e-5, "round {round}, step {step}: {ours} {theirs}");
                 }
             }
-            let loss: f64 = network.loss(&padded, None, &sizes).into_data().iter::<f64>().next().unwrap();
             let original = loss + normalisation.mean_log_scale(&[&sequence]);
             let ours = -log_density / steps as f64;
             assert!((ours - original).abs() < 1e-5 * original.abs(), "original units: {ours} {original}");

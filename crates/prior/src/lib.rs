@@ -4,9 +4,8 @@
 //! [`Checkpoint`](checkpoint::Checkpoint), one folder on disk; [`Inference`](inference::Inference) reads it, takes one
 //! observation at a time and returns a [`Mixture`](mixture::Mixture) that can be sampled and evaluated.
 //!
-//! One set of weights runs in three ways, and tests compare them. [`network`] in burn with autodiff is the reference.
-//! [`fused`] computes gradients by hand on packed batches, for training. [`inference`] takes plain slices, one step at
-//! a time.
+//! One set of weights runs in two ways, and tests compare them. [`fused`] computes gradients by hand on packed batches, for training;
+//! PyTorch is its reference. [`inference`] takes plain slices, one step at a time.
 //!
 //! # What was decided, and why
 //!
@@ -33,7 +32,7 @@
 //!
 //! ```
 //! use pomdp::{Purpose, Seed};
-//! use prior::{GradientPath, Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, Transform};
+//! use prior::{Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, Transform};
 //!
 //! let layout = Layout {
 //!     robot: "sawyer".into(),
@@ -61,7 +60,6 @@
 //!     weight_decay: 0.0,
 //!     dropout: 0.0,
 //!     rescale: true,
-//!     gradient: GradientPath::Fused,
 //! };
 //! let mut trainer = Trainer::new(config, layout, &data, Seed(1))?;
 //! while !trainer.finished() {
@@ -85,14 +83,11 @@ pub mod fused;
 pub mod inference;
 pub mod layout;
 pub mod mixture;
-#[cfg(feature = "training")]
-pub mod network;
 pub mod normalise;
 pub mod parameters;
 pub mod pictures;
 pub mod settings;
 pub mod suggest;
-#[cfg(feature = "training")]
 pub mod train;
 
 pub use calibrate::{Baseline, Calibration, Episode, Models, calibrate};
@@ -104,10 +99,9 @@ pub use layout::{ClassTarget, Layout, Sequence, Transform};
 pub use mixture::{Draw, Mixture};
 pub use normalise::Normalisation;
 pub use parameters::{Dimensions, NetworkConfig, Parameters};
-pub use settings::{EpochReport, GradientPath, Schedule, TrainConfig};
+pub use settings::{EpochReport, Schedule, TrainConfig};
 pub use suggest::Suggester;
 
-#[cfg(feature = "training")]
 pub use train::{Trainer, curve_csv, is_held_out};
 
 /// The default network of a program, whose folder has one of `names`, the best one first. With `quick`, what was trained quickly comes before all

@@ -11,9 +11,7 @@ use dataset::Reader;
 use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
 use prior::features::{self, ActionInput};
-use prior::{
-    GradientPath, Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, curve_csv, write_atomically,
-};
+use prior::{Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, curve_csv, write_atomically};
 use program::{Failed, typed};
 
 /// Trains the prior: LSTM with a mixture density head over (s, Θ).
@@ -41,9 +39,6 @@ struct Arguments {
     /// Decoupled weight decay; the paper has none.
     #[arg(long, default_value_t = 0.0)]
     weight_decay: f64,
-    /// Computes gradients by burn's autodiff instead of by hand: slower, and the reference that the other is tested against.
-    #[arg(long)]
-    autodiff: bool,
     /// Keeps the learning rate at 0.001, as published, instead of letting it fall along half a cosine.
     #[arg(long)]
     constant_rate: bool,
@@ -120,7 +115,6 @@ fn run(arguments: &Arguments) -> Result<bool> {
         weight_decay: arguments.weight_decay,
         dropout: arguments.dropout,
         rescale: true,
-        gradient: if arguments.autodiff { GradientPath::Autodiff } else { GradientPath::Fused },
     };
     let seed = Seed(arguments.seed);
     whole_file::check_owner(&out, "prior.json")?;

@@ -4,16 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::parameters::NetworkConfig;
 
-/// Which code computes the gradient; both give the same up to rounding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum GradientPath {
-    /// By hand on packed batches (see [`crate::fused`]), the fast one.
-    Fused,
-    /// burn's autodiff on padded batches, the reference.
-    Autodiff,
-}
-
 /// Course of the learning rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -24,9 +14,8 @@ pub enum Schedule {
     Cosine,
 }
 
-/// Settings of a training run; every one of them changes the weights.
+/// Settings of a training run; every one of them changes the weights. Keys that it does not know are those of older versions, as `gradient`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct TrainConfig {
     /// Shape of the network.
     pub network: NetworkConfig,
@@ -53,8 +42,6 @@ pub struct TrainConfig {
     pub dropout: f64,
     /// Whether the stated spread of each target is multiplied by one factor, fitted on the held-out episodes, in the end.
     pub rescale: bool,
-    /// Which code computes the gradient.
-    pub gradient: GradientPath,
 }
 
 /// One row of the learning curve; likelihoods in nats a step and original units.

@@ -1,5 +1,6 @@
 //! The training loop: seeded, resumable, with early stopping on held-out episodes.
 
+mod adam;
 mod rescale;
 mod split;
 mod state;
@@ -10,12 +11,11 @@ pub use split::is_held_out;
 use crate::calibrate::Baseline;
 use crate::checkpoint::{Checkpoint, TrainingFacts};
 use crate::fused::{Batch, Workspace};
-use crate::network::{Network, device};
 use crate::normalise::Normalisation;
 use crate::parameters::{Dimensions, Parameters};
-use crate::settings::{EpochReport, GradientPath, Schedule, TrainConfig};
+use crate::settings::{EpochReport, Schedule, TrainConfig};
 use crate::{Error, Layout, Sequence};
-use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
+use adam::Adam;
 use pomdp::{Purpose, Seed};
 use rand::seq::SliceRandom as _;
 use rayon::prelude::*;
@@ -50,9 +50,7 @@ pub struct Trainer {
     /// What turns the training likelihood into original units.
     training_offset: f64,
     held_out_offset: f64,
-    network: Network,
-    optimizer: ModuleOptimizer,
-    /// Weights of `network`.
+    adam: Adam,
     parameters: Parameters<f32>,
     best: Parameters<f32>,
     steps: u64,
@@ -87,9 +85,7 @@ impl Trainer {
             held_out_offset: normalisation.mean_log_scale(&held_out),
             training: training.iter().map(|sequence| normalisation.apply(sequence)).collect(),
             held_out: held_out.iter().map(|sequence| normalisation.apply(sequence)).collect(),
-            // On the autodiff device in both cases: burn's optimisers take no other module.
-            network: Network::new(&parameters, &dimensions, &device().autodiff()),
-            optimizer: config.optimizer(),
+            adam: Adam::new(&dimensions),
             best: parameters.clone(),
             parameters,
             steps: 0,
@@ -253,14 +249,6 @@ impl TrainConfig {
         match tests.into_iter().find(|(_, _, fits, _)| !fits) {
             Some((setting, found, _, expected)) => Err(Error::Config { setting, found: found.to_string(), expected }),
             None => Ok(()),
-        }
-    }
-
-    fn optimizer(&self) -> ModuleOptimizer {
-        if self.weight_decay == 0.0 {
-            AdamConfig::new().with_epsilon(1e-8).init()
-        } else {
-            AdamWConfig::new().with_epsilon(1e-8).with_weight_decay(self.weight_decay as f32).init()
         }
     }
 }

@@ -97,7 +97,7 @@ fn mistakes_are_found() {
 }
 
 /// First violation of `schema`, with its key. Knows the keywords that our schemas use and refuses others. (The crate `jsonschema` would switch
-/// on features of num-traits and ahash, for which rapier, burn and parquet would be compiled a second time.)
+/// on features of num-traits and ahash, for which rapier and parquet would be compiled a second time.)
 fn problem(root: &Value, schema: &Value, value: &Value, key: &str) -> Option<String> {
     let schema = match schema {
         Value::Bool(true) => return None,

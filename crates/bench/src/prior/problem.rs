@@ -7,8 +7,8 @@ use dataset::Reader;
 use pomdp::{Purpose, Rng, Seed};
 use prior::features::ActionInput;
 use prior::{
-    ClassTarget, GradientPath, Layout, NetworkConfig, Normalisation, Parameters, Schedule, Sequence, TrainConfig,
-    Trainer, Transform, features, is_held_out,
+    ClassTarget, Layout, NetworkConfig, Normalisation, Parameters, Schedule, Sequence, TrainConfig, Trainer, Transform,
+    features, is_held_out,
 };
 use rand::RngExt as _;
 use rand::seq::SliceRandom as _;
@@ -47,7 +47,6 @@ fn published(held_out: f64, clip_norm: Option<f64>) -> TrainConfig {
         weight_decay: 0.0,
         dropout: 0.0,
         rescale: false,
-        gradient: GradientPath::Fused,
     }
 }
 
@@ -85,8 +84,8 @@ impl Problem {
         Ok(Self { layout, data, config: published(0.1, Some(10.0)) })
     }
 
-    pub(crate) fn trainer(&self, gradient: GradientPath, chunks: usize) -> Result<Trainer> {
-        let config = TrainConfig { gradient, chunks, ..self.config.clone() };
+    pub(crate) fn trainer(&self, chunks: usize) -> Result<Trainer> {
+        let config = TrainConfig { chunks, ..self.config.clone() };
         Ok(Trainer::new(config, self.layout.clone(), &self.data, SEED)?)
     }
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use pomdp::{Purpose, Seed};
 use prior::normalise::Scale;
 use prior::{
-    Baseline, Checkpoint, ClassTarget, Dimensions, GradientPath, Layout, NetworkConfig, Normalisation, Parameters,
-    Schedule, TrainConfig, TrainingFacts, Transform,
+    Baseline, Checkpoint, ClassTarget, Dimensions, Layout, NetworkConfig, Normalisation, Parameters, Schedule,
+    TrainConfig, TrainingFacts, Transform,
 };
 use serde_json::Value;
 
@@ -131,7 +131,6 @@ fn small(labels: &[usize]) -> Checkpoint {
         weight_decay: 0.0,
         dropout: 0.0,
         rescale: false,
-        gradient: GradientPath::Fused,
     };
     let dimensions = Dimensions::new(&network, &layout).unwrap_or_else(|error| panic!("{error}"));
     Checkpoint {

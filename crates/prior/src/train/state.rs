@@ -2,15 +2,13 @@
 
 use super::{EpochReport, TrainConfig, Trainer};
 use crate::files::{self, FileRef};
-use crate::network::{Network, device};
 use crate::{Error, Layout, Sequence};
-use burn::tensor::Bytes;
 use pomdp::Seed;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Version of `training.json`.
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 
 /// File that makes a folder a training state.
 const FILE: &str = "training.json";
@@ -28,7 +26,10 @@ struct Manifest {
     curve: Vec<EpochReport>,
     current: FileRef,
     best: FileRef,
-    optimizer: FileRef,
+    /// Adam's mean of the gradient.
+    first: FileRef,
+    /// Adam's mean of its square.
+    second: FileRef,
 }
 
 impl Trainer {
@@ -37,14 +38,12 @@ impl Trainer {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] if the disk refuses, [`Error::Optimizer`] if burn does.
+    /// [`Error::Io`] if the disk refuses.
     pub fn save(&self, dir: &Path) -> Result<(), Error> {
         let specs = self.dimensions.tensors();
         let weights = |prefix, parameters| {
             files::write_blob(dir, prefix, "safetensors", &files::to_safetensors(parameters, &specs))
         };
-        let bytes = self.optimizer.into_bytes();
-        let bytes = bytes.map_err(|error| Error::Optimizer { path: dir.into(), reason: error.to_string() })?;
         let manifest = Manifest {
             version: VERSION,
             layout: self.layout.clone(),
@@ -55,9 +54,11 @@ impl Trainer {
             curve: self.curve.clone(),
             current: weights("current", &self.parameters)?,
             best: weights("best", &self.best)?,
-            optimizer: files::write_blob(dir, "optimizer", "bpk", &bytes)?,
+            first: weights("first", &self.adam.first)?,
+            second: weights("second", &self.adam.second)?,
         };
-        let sets = [("current", &manifest.current), ("best", &manifest.best), ("optimizer", &manifest.optimizer)];
+        let Manifest { current, best, first, second, .. } = &manifest;
+        let sets = [("current", current), ("best", best), ("first", first), ("second", second)];
         files::commit(dir, FILE, &manifest, &sets)
     }
 
@@ -79,11 +80,8 @@ impl Trainer {
             |file: &FileRef| files::from_safetensors(&files::read_blob(dir, file)?, &specs, &dir.join(&file.name));
         trainer.parameters = weights(&manifest.current)?;
         trainer.best = weights(&manifest.best)?;
-        trainer.network = Network::new(&trainer.parameters, &trainer.dimensions, &device().autodiff());
-        let bytes = Bytes::from_bytes_vec(files::read_blob(dir, &manifest.optimizer)?);
-        let path = dir.join(&manifest.optimizer.name);
-        let optimizer = trainer.config.optimizer().from_bytes(bytes);
-        trainer.optimizer = optimizer.map_err(|error| Error::Optimizer { path, reason: error.to_string() })?;
+        trainer.adam.first = weights(&manifest.first)?;
+        trainer.adam.second = weights(&manifest.second)?;
         trainer.steps = manifest.steps;
         trainer.curve = manifest.curve;
         Ok(trainer)

@@ -1,8 +1,7 @@
 //! One optimiser step.
 
-use super::{GradientPath, Trainer};
+use super::Trainer;
 use crate::fused::{Batch, Dropout, Workspace};
-use crate::network::{Network, Padded, device};
 use crate::parameters::{Dimensions, Parameters};
 use crate::{Error, Sequence};
 use pomdp::{Purpose, Rng};
@@ -24,10 +23,7 @@ impl Trainer {
     /// One step on the training sequences `indices`.
     pub(super) fn step(&mut self, indices: &[usize]) -> Result<Done, Error> {
         let transitions = indices.iter().map(|&index| self.training[index].steps).sum();
-        let (loss, mut gradient) = match self.config.gradient {
-            GradientPath::Fused => self.fused_gradient(indices, transitions),
-            GradientPath::Autodiff => self.autodiff_gradient(indices),
-        };
+        let (loss, mut gradient) = self.gradient(indices, transitions);
         let norm = gradient.norm();
         if !norm.is_finite() {
             return Err(Error::Diverged { epoch: self.curve.len() + 1, step: self.steps as usize, norm });
@@ -36,10 +32,9 @@ impl Trainer {
             let factor = (limit / norm) as f32;
             gradient.tensors.iter_mut().flatten().for_each(|value| *value *= factor);
         }
-        let gradients = Network::register(gradient, &self.dimensions, &device());
-        self.network = self.optimizer.step(self.learning_rate(), self.network.clone(), gradients);
-        self.parameters = self.network.parameters();
         self.steps += 1;
+        let rate = self.learning_rate();
+        self.adam.step(&mut self.parameters, &gradient, self.steps, rate, self.config.weight_decay);
         Ok(Done { loss, transitions, norm })
     }
 
@@ -66,7 +61,7 @@ impl Trainer {
     }
 
     /// Deals the batch into a fixed number of chunks, so that the sums do not depend on the number of threads.
-    fn fused_gradient(&mut self, indices: &[usize], transitions: usize) -> (f64, Parameters<f32>) {
+    fn gradient(&mut self, indices: &[usize], transitions: usize) -> (f64, Parameters<f32>) {
         let (sizes, parameters, chunks) = (&self.dimensions, &self.parameters, self.config.chunks);
         let sequences = self.remembered(indices.iter().map(|&index| &self.training[index]));
         let mut sequences: Vec<&Sequence> = sequences.iter().map(AsRef::as_ref).collect();
@@ -86,17 +81,6 @@ impl Trainer {
             })
             .collect();
         (losses.iter().sum(), sum(&self.spaces))
-    }
-
-    fn autodiff_gradient(&self, indices: &[usize]) -> (f64, Parameters<f32>) {
-        let sequences = self.remembered(indices.iter().map(|&index| &self.training[index]));
-        let sequences: Vec<&Sequence> = sequences.iter().map(AsRef::as_ref).collect();
-        let batch = Padded::new(&sequences, &self.dimensions, &device().autodiff());
-        let mut rng = self.seed.stream(Purpose::Regularisation, self.steps);
-        let factors = dropout_factors(self.config.dropout, &self.dimensions, batch.steps(), &mut rng);
-        let loss = self.network.loss(&batch, factors.as_ref(), &self.dimensions);
-        let gradient = self.network.gradients(&loss.backward());
-        (f64::from(loss.into_scalar::<f32>()) * batch.steps() as f64, gradient)
     }
 }
 

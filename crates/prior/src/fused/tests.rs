@@ -1,5 +1,5 @@
 use super::*;
-use crate::fused::{Real, Workspace};
+use crate::Sequence;
 use crate::parameters::tests::dimensions;
 use pomdp::{Purpose, Rng, Seed};
 use rand::RngExt as _;
@@ -33,42 +33,6 @@ fn random_dropout(sizes: &Dimensions, rows: usize, rng: &mut Rng) -> Dropout<f32
     sizes.hidden.iter().map(|&width| (0..rows * width).map(|_| factor()).collect()).collect()
 }
 
-/// Loss and gradient by burn's autodiff.
-fn by_autodiff(
-    sizes: &Dimensions,
-    parameters: &Parameters<f32>,
-    sequences: &[&Sequence],
-    dropout: Option<&Dropout<f32>>,
-) -> (f64, Parameters<f32>) {
-    let device = device().autodiff();
-    let network = Network::new(parameters, sizes, &device);
-    let loss = network.loss(&Padded::new(sequences, sizes, &device), dropout, sizes);
-    let gradients = network.gradients(&loss.backward());
-    (loss.into_data().iter::<f64>().next().unwrap(), gradients)
-}
-
-#[test]
-fn fused_and_autodiff_agree_on_loss_and_gradient() {
-    for item in 0..3 {
-        let (sizes, parameters, sequences, mut rng) = problem(item);
-        let sequences: Vec<&Sequence> = sequences.iter().collect();
-        let batch = Batch::<f32>::pack(&sequences, &sizes);
-        let dropout = (item > 0).then(|| random_dropout(&sizes, batch.rows, &mut rng));
-        let (reference_loss, reference) = by_autodiff(&sizes, &parameters, &sequences, dropout.as_ref());
-        let mut space = Workspace::new(&sizes);
-        let scale = 1.0 / batch.rows as f32;
-        let loss = space.loss_and_gradient(&parameters, &batch, dropout.as_ref(), scale) / batch.rows as f64;
-        assert!((loss - reference_loss).abs() < 1e-5 * reference_loss.abs(), "{loss} {reference_loss}");
-        for ((fused, reference), spec) in space.gradient.tensors.iter().zip(&reference.tensors).zip(sizes.tensors()) {
-            let largest = reference.iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
-            assert!(largest > 1e-4, "{}: a gradient of zero compares nothing", spec.name);
-            for (fused, reference) in fused.iter().zip(reference) {
-                assert!((fused - reference).abs() <= 1e-5 * largest, "{}: {fused} {reference}", spec.name);
-            }
-        }
-    }
-}
-
 #[test]
 fn gradient_is_that_of_finite_differences_in_f64() {
     let (sizes, parameters, sequences, mut rng) = problem(9);
@@ -100,24 +64,6 @@ fn gradient_is_that_of_finite_differences_in_f64() {
 }
 
 #[test]
-fn fused_outputs_equal_burns_forward_pass() {
-    let (sizes, parameters, sequences, _) = problem(3);
-    let sequences: Vec<&Sequence> = sequences.iter().collect();
-    let device = device();
-    let padded = Padded::new(&sequences, &sizes, &device);
-    let heads = Network::new(&parameters, &sizes, &device).forward(&padded, None);
-    let reference: Vec<f32> = Tensor::cat(heads, 1).into_data().try_into_vec().unwrap();
-    let batch = Batch::pack(&sequences, &sizes);
-    let mut space = Workspace::new(&sizes);
-    let width = sizes.outputs();
-    for (row, &position) in space.outputs(&parameters, &batch).chunks_exact(width).zip(padded.positions()) {
-        for (ours, theirs) in row.iter().zip(&reference[position * width..]) {
-            assert!((ours - theirs).abs() < 1e-5, "{ours} {theirs}");
-        }
-    }
-}
-
-#[test]
 fn what_the_mask_hides_changes_nothing() {
     let (sizes, parameters, mut sequences, _) = problem(4);
     let run = |sequences: &[Sequence]| {
@@ -135,13 +81,6 @@ fn what_the_mask_hides_changes_nothing() {
     let (index, _) = sequences[0].mask.iter().enumerate().find(|(_, mask)| **mask == 1.0).unwrap();
     sequences[0].targets[index] += 0.1;
     assert_ne!(before.0, run(&sequences).0, "a target that applies does count");
-}
-
-#[test]
-fn network_returns_the_weights_it_was_made_of() {
-    let (sizes, parameters, _, _) = problem(6);
-    assert_eq!(Network::new(&parameters, &sizes, &device()).parameters(), parameters);
-    assert_eq!(Network::new(&parameters, &sizes, &device().autodiff()).parameters(), parameters);
 }
 
 /// A small network with its loss and gradient in f64, written by PyTorch (tests/peers/pytorch_prior.py --reference).
@@ -212,22 +151,33 @@ fn assert_gradients_agree<T: Real>(
 }
 
 #[test]
-fn fused_loss_and_gradient_are_those_that_pytorch_recorded() {
-    let (sizes, weights, sequences, loss, gradient) = recorded();
-    let batch = Batch::<f64>::pack(&sequences.iter().collect::<Vec<_>>(), &sizes);
-    let mut space = Workspace::new(&sizes);
-    let scale = 1.0 / batch.rows as f64;
-    let ours = scale * space.loss_and_gradient(&weights, &batch, None, scale);
-    assert!((ours / loss - 1.0).abs() < 1e-9, "{ours} {loss}");
-    assert_gradients_agree(&space.gradient, &gradient, &sizes, 1e-9);
+fn loss_and_gradient_are_those_that_pytorch_recorded() {
+    fn check<T: Real>(convert: impl Fn(f64) -> T, tolerance: f64) {
+        let (sizes, weights, sequences, loss, gradient) = recorded();
+        let weights = weights.map(convert);
+        let batch = Batch::<T>::pack(&sequences.iter().collect::<Vec<_>>(), &sizes);
+        let mut space = Workspace::new(&sizes);
+        let ours = space.loss_and_gradient(&weights, &batch, None, T::from_f64(1.0 / batch.rows as f64));
+        let ours = ours / batch.rows as f64;
+        assert!((ours / loss - 1.0).abs() < tolerance, "{ours} {loss}");
+        assert_gradients_agree(&space.gradient, &gradient, &sizes, tolerance);
+    }
+    let (_, weights, ..) = recorded();
+    assert_eq!(weights.map(|value| value as f32).map(f64::from), weights, "the recorded weights are exact in f32");
+    check::<f64>(|value| value, 1e-9);
+    check::<f32>(|value| value as f32, 1e-5);
 }
 
 #[test]
-fn burns_loss_and_gradient_are_those_that_pytorch_recorded() {
-    let (sizes, weights, sequences, loss, gradient) = recorded();
-    let narrow = weights.map(|value| value as f32);
-    assert_eq!(narrow.map(f64::from), weights, "the recorded weights are exact in f32");
-    let (ours, by_autodiff) = by_autodiff(&sizes, &narrow, &sequences.iter().collect::<Vec<_>>(), None);
-    assert!((ours / loss - 1.0).abs() < 1e-5, "{ours} {loss}");
-    assert_gradients_agree(&by_autodiff, &gradient, &sizes, 1e-5);
+fn in_f32_loss_and_gradient_are_those_of_f64_with_dropout() {
+    let (sizes, parameters, sequences, mut rng) = problem(1);
+    let sequences: Vec<&Sequence> = sequences.iter().collect();
+    let (narrow, wide) = (Batch::<f32>::pack(&sequences, &sizes), Batch::<f64>::pack(&sequences, &sizes));
+    let dropout = random_dropout(&sizes, narrow.rows, &mut rng);
+    let exact = dropout.iter().map(|layer| layer.iter().map(|&factor| f64::from(factor)).collect()).collect();
+    let (mut ours, mut reference) = (Workspace::new(&sizes), Workspace::new(&sizes));
+    let loss = ours.loss_and_gradient(&parameters, &narrow, Some(&dropout), 1.0);
+    let expected = reference.loss_and_gradient(&parameters.map(f64::from), &wide, Some(&exact), 1.0);
+    assert!((loss / expected - 1.0).abs() < 1e-5, "{loss} {expected}");
+    assert_gradients_agree(&ours.gradient, &reference.gradient, &sizes, 1e-5);
 }
