@@ -1,8 +1,9 @@
-//! What a diagnosis leaves behind: `report.json`, `report.html` and `model.toml`, whoever asked for them.
+//! What a diagnosis leaves behind, whoever asked for it: `report.json`, `report.html`, `model.toml`, and the model as files of other simulators.
 
 use std::path::{Path, PathBuf};
 
 use measured_log::Log;
+use simulator_files::{mjcf, urdf};
 use whole_file::{Existing, Owner};
 
 use crate::diagnosis::{Diagnosis, Settings};
@@ -13,7 +14,8 @@ use crate::page::page;
 use crate::report::Report;
 
 /// What is written, the report last: with it all is there.
-pub const FILES: [&str; 3] = ["model.toml", "report.html", "report.json"];
+pub const FILES: [&str; 6] =
+    ["nominal.mjcf.xml", "model.mjcf.xml", "model.urdf", "model.toml", "report.html", "report.json"];
 
 /// The answer to a log.
 #[derive(Clone, Debug)]
@@ -24,6 +26,8 @@ pub struct Answer {
     pub report: Report,
     /// Content of `model.toml`.
     pub model: ModelFile,
+    /// Text of `nominal.mjcf.xml`, the re-tuned nominal model, `model.mjcf.xml` and `model.urdf`.
+    pub simulators: [String; 3],
 }
 
 impl Answer {
@@ -41,7 +45,10 @@ impl Answer {
         report.warn(log, nominal);
         report.model = begun.map(|(name, _)| name.into());
         let model = ModelFile::new(nominal, diagnosis, &report, begun.map(|(_, file)| file));
-        Self { name: name.into(), report, model }
+        let [before, after] = [&ModelFile::retuned(nominal, diagnosis), &model].map(|file| file.applied(nominal));
+        let [before, after] = [before.scene(name), after.scene(name)];
+        let simulators = [mjcf(&before), mjcf(&after), urdf(&after)];
+        Self { name: name.into(), report, model, simulators }
     }
 
     /// Text of `report.json`.
@@ -68,7 +75,7 @@ impl Answer {
     pub fn write(&self, out: &Path, owner: &Owner) -> Result<(), Error> {
         let texts = [self.model.to_toml()?, self.page(), self.json()?];
         owner.claim(out)?;
-        for (file, text) in FILES.into_iter().zip(&texts) {
+        for (file, text) in FILES.into_iter().zip(self.simulators.iter().chain(&texts)) {
             whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
         }
         Ok(())

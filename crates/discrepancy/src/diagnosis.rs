@@ -419,7 +419,8 @@ mod tests {
     /// What a report says of a log whose candidates `catalogue` changes, but for what it cost.
     fn answer(log: &Log, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
         let nominal = Nominal::new(&log.header, crate::rig_tool(log, None).unwrap()).unwrap();
-        let settings = Settings { looks: 6, quick_fits: 3, effects: 1, ..Settings::default() };
+        let short = Settings { rollouts: 1500, most: 1600, limit: 1800, ..Settings::default() };
+        let settings = Settings { looks: 6, quick_fits: 3, effects: 1, ..short };
         let made = |context: &Context| catalogue(candidates(context));
         let diagnosis = diagnose_among(log, "log", &nominal, &settings, &(), &made).unwrap();
         let mut report = serde_json::to_value(Report::new(&diagnosis, &settings, 0.0)).unwrap();

@@ -29,7 +29,7 @@ struct Arguments {
     /// Model to begin with instead of the log's nominal one: the model.toml of an earlier diagnosis.
     #[arg(long)]
     model: Option<PathBuf>,
-    /// Folder for report.json, report.html and model.toml [default: runs/diagnose/NAME of the log's folder; where that holds the answer to another
+    /// Folder for the answer: report, model and files of other simulators [default: runs/diagnose/NAME of the log's folder; where that holds the answer to another
     /// log, runs/diagnose/NAME- and a hash].
     #[arg(long)]
     out: Option<PathBuf>,

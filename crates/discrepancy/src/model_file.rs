@@ -153,6 +153,16 @@ impl ModelFile {
         Ok(pairs.map(|(nominal, applied)| nominal.coordinate(applied.mean)).collect())
     }
 
+    /// `nominal` with the values and effects of the file, which was made of a diagnosis of it.
+    pub(crate) fn applied(&self, nominal: &Nominal) -> Nominal {
+        let mut applied = nominal.clone();
+        applied.effects.clone_from(&self.effects.model);
+        for tunable in &mut applied.tunables {
+            tunable.mean = self.nominal.get(&tunable.key).copied().unwrap_or(tunable.mean);
+        }
+        applied
+    }
+
     /// Gives a nominal model what the file says: values become the means of what may be re-tuned, effects are switched on.
     ///
     /// # Errors

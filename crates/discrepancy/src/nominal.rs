@@ -9,6 +9,7 @@ use measured_log::{Header, Number, Shape};
 use physics_model::config::{ObstacleMobility, WorldConfig};
 use physics_model::rig::{Prism, Rig, RigObject, RigShape, RigTool};
 use physics_model::{EffectConfig, EffectKind, ObjectShape};
+use simulator_files::Scene;
 
 use crate::clock::Clock;
 use crate::error::Error;
@@ -372,6 +373,14 @@ impl Nominal {
             obstacle_mobility: ObstacleMobility::Movable,
         };
         Rig { world, tick_steps: steps, tool: self.tool.clone(), tool_slip_mps: engine.tool_slip_mps }
+    }
+
+    /// The rig at its means, as files of other simulators take it.
+    #[must_use]
+    pub fn scene<'a>(&self, name: &'a str) -> Scene<'a> {
+        let (z, engine) = (vec![0.0; self.tunables.len()], self.engine());
+        let (rig, object) = (self.rig(&z, &engine), self.object(&z, 0.0, &engine));
+        Scene { name, rig, object, effects: self.effects.clone() }
     }
 
     /// The object with coordinates `z` and a known weight.

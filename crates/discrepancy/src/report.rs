@@ -15,7 +15,7 @@ use crate::noise::SensorNoise;
 use crate::nominal::Nominal;
 use crate::rival::Rival;
 use crate::separate;
-use crate::split::Split;
+use crate::split::{Plain, Split};
 use crate::terms::LackingForce;
 use crate::touch::ContactGap;
 use crate::verdict::closed_fraction;
@@ -91,6 +91,8 @@ pub struct Heldout {
     pub unit: &'static str,
     /// Of each held-out episode that nothing was chosen by: number in the log, before, after.
     pub episodes: Vec<(u64, f64, f64)>,
+    /// The same by channel, in units of the sensors' noise alone: what another simulator's replay of these episodes can be compared with.
+    pub plain: Vec<Plain>,
 }
 
 /// A re-tuned value of the nominal model.
@@ -304,6 +306,7 @@ impl Report {
                 closed_fraction: if verdict == Verdict::None { 1.0 } else { closed_fraction(before, after) },
                 unit: "chi2 per sample",
                 episodes: diagnosis.reported.episodes.clone(),
+                plain: diagnosis.reported.plain.clone(),
             },
             probabilities: diagnosis.probabilities.clone(),
             findings: diagnosis.findings.clone(),

@@ -18,7 +18,7 @@ use crate::nominal::Nominal;
 use crate::rival::{Rival, Round};
 use crate::search::Search;
 use crate::study::Study;
-use crate::trial::{Trial, groups};
+use crate::trial::{Kind, Trial, groups};
 
 /// Episodes that a fit needs: a bootstrap of fewer says nothing.
 pub(crate) const LEAST_FITTED: usize = 4;
@@ -134,11 +134,44 @@ pub struct HeldOut {
     pub counts: Vec<usize>,
     /// Of each episode: number in the log, mean squares.
     pub episodes: Vec<(u64, f64, f64)>,
+    /// Each channel in units of its sensor's noise alone.
+    pub plain: Vec<Plain>,
+}
+
+/// Mean squares of a channel in units of its sensor's noise, whatever engines differ by: what another simulator's replay can be compared with.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Plain {
+    /// What is measured.
+    pub channel: Kind,
+    /// Number of residuals.
+    pub residuals: usize,
+    /// Of the re-tuned nominal model.
+    pub before: f64,
+    /// With the named effects.
+    pub after: f64,
+}
+
+/// Of the raw residuals of a study before and after.
+fn plain(study: &Study, raw: &[Vec<Vec<f64>>; 2]) -> Vec<Plain> {
+    let of = |kind: Kind| {
+        let squares = |raw: &[Vec<f64>]| -> Vec<f64> {
+            let one = |(index, raw): (&usize, &Vec<f64>)| -> Vec<f64> {
+                let blocks = study.simulator.trials[*index].blocks.iter().zip(raw);
+                blocks.filter(|(block, _)| block.kind == kind).map(|(_, residual)| residual * residual).collect()
+            };
+            study.chosen.iter().zip(raw).flat_map(one).collect()
+        };
+        let [before, after] = raw.each_ref().map(|raw| squares(raw));
+        let mean = |squares: &[f64]| squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        Plain { channel: kind, residuals: before.len(), before: mean(&before), after: mean(&after) }
+    };
+    Kind::ALL.into_iter().map(of).filter(|plain| plain.residuals > 0).collect()
 }
 
 impl HeldOut {
     pub(crate) fn new(study: &Study, models: [&Fit; 2]) -> Self {
-        let sums = models.map(|fit| squares(study, fit));
+        let raw = models.map(|fit| study.raw(&fit.model.hypothesis(&fit.x)));
+        let sums = [0, 1].map(|i| whitened(study, models[i], &raw[i]));
         let trial = |place: usize| &study.simulator.trials[study.chosen[place]];
         let counts: Vec<usize> = (0..study.chosen.len()).map(|place| trial(place).blocks.len()).collect();
         let one = |group: Range<usize>| {
@@ -147,7 +180,7 @@ impl HeldOut {
             (trial(group.start).id, before, after)
         };
         let episodes = groups(study.chosen.iter().map(|index| &study.simulator.trials[*index]));
-        Self { episodes: episodes.into_iter().map(one).collect(), sums, counts }
+        Self { episodes: episodes.into_iter().map(one).collect(), plain: plain(study, &raw), sums, counts }
     }
 
     pub(crate) fn is_finite(&self) -> bool {
@@ -164,8 +197,11 @@ impl HeldOut {
 
 /// Sums of squares of the episodes of a study under a model.
 pub(crate) fn squares(study: &Study, fit: &Fit) -> Vec<f64> {
-    let raw = study.raw(&fit.model.hypothesis(&fit.x));
-    study.white(&raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
+    whitened(study, fit, &study.raw(&fit.model.hypothesis(&fit.x)))
+}
+
+fn whitened(study: &Study, fit: &Fit, raw: &[Vec<f64>]) -> Vec<f64> {
+    study.white(raw, fit.model.engine_errors(&fit.x)).iter().map(DVector::norm_squared).collect()
 }
 
 /// Mean squares of the episodes of a study under each rival of the first round.

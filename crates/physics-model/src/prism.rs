@@ -90,6 +90,12 @@ impl Prism {
         &self.feet_m
     }
 
+    /// Up to eight corners of its convex hull, m, object frame: those that it stands on where it has no feet, and tips over.
+    #[must_use]
+    pub fn extremes_m(&self) -> Vec<Point> {
+        extremes(&self.outline_m)
+    }
+
     /// Full lengths, m, of the box around it along the object's axes.
     #[must_use]
     pub fn size_m(&self) -> [f64; 3] {
@@ -101,7 +107,8 @@ impl Prism {
     }
 
     /// Inertia, kg m², of a uniform solid of `mass_kg` about its centroid, object axes.
-    pub(crate) fn inertia_kgm2(&self, mass_kg: f64) -> Matrix3<f64> {
+    #[must_use]
+    pub fn inertia_kgm2(&self, mass_kg: f64) -> Matrix3<f64> {
         let [xx, yy, xy] = self.spread_m2;
         let zz = self.height_m * self.height_m / 12.0;
         Matrix3::new(yy + zz, -xy, 0.0, -xy, xx + zz, 0.0, 0.0, 0.0, xx + yy) * mass_kg

@@ -52,19 +52,18 @@ fn probabilities() -> Probabilities {
     Probabilities { effects: vec![("table_tilt".into(), 0.97)], none: 0.01, unknown: 0.02 }
 }
 
+fn slope() -> Value {
+    let (name, key) = ("slope_x".into(), "slope_x_rad".into());
+    Value { name, key, unit: "rad", value: -0.021, interval90: [-0.023, -0.019] }
+}
+
 fn report(verdict: Verdict) -> Report {
     let tilt = NamedEffect {
         name: "table_tilt",
         description: "The table is not level.",
         confidence: 0.97,
         log_evidence: 210.0,
-        parameters: vec![Value {
-            name: "slope_x".into(),
-            key: "slope_x_rad".into(),
-            unit: "rad",
-            value: -0.021,
-            interval90: [-0.023, -0.019],
-        }],
+        parameters: vec![slope()],
     };
     let cells = vec![
         cell(Kind::WristForce, Phase::Sliding, 31.0, 0.001),
@@ -111,6 +110,7 @@ fn report(verdict: Verdict) -> Report {
             closed_fraction: 0.99,
             unit: "chi2 per sample",
             episodes: vec![(3, 12.0, 1.1), (7, 4.0, 0.9)],
+            plain: Vec::new(),
         },
         retuned: vec![Retuned {
             key: "object.mass_kg".into(),
