@@ -55,6 +55,11 @@ fn priors_are_read_or_refused() {
 }
 
 #[test]
+fn recordings_of_others_are_imported_or_refused() {
+    run("import_log", 2000, MOST_BYTES);
+}
+
+#[test]
 fn measured_logs_are_read_or_refused() {
     run("measured_log", 6000, MOST_BYTES);
 }

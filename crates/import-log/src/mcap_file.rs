@@ -6,7 +6,7 @@ use std::panic::AssertUnwindSafe;
 use std::path::Path;
 
 use mcap::McapError;
-use mcap::records::{ChunkHeader, Record, SchemaHeader};
+use mcap::records::{ChunkHeader, Record, SchemaHeader, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use crate::Error;
@@ -20,6 +20,8 @@ const LARGEST_RECORD: usize = 64 << 20;
 const LARGEST_WINDOW_LOG: u32 = 26;
 /// Bytes that are read at once.
 const READ_BYTES: usize = 256 << 10;
+/// Records that are read. Of others a damaged count would have the crate take gigabytes.
+const READ: [u8; 4] = [op::SCHEMA, op::CHANNEL, op::MESSAGE, op::CHUNK];
 /// Channels and bytes of definitions at most.
 const MOST_CHANNELS: usize = 10_000;
 const MOST_DEFINITIONS: usize = 64 << 20;
@@ -78,7 +80,9 @@ fn read_trusting<S: Sink>(path: &Path, sink: &mut S) -> Result<(), Error> {
                 let count = bytes.read(reader.insert(need.min(LARGEST_RECORD))).map_err(Error::io("read", path))?;
                 reader.notify_read(count);
             }
+            LinearReadEvent::Record { opcode, .. } if !READ.contains(&opcode) => {}
             LinearReadEvent::Record { opcode, data } => {
+                check_texts(path, opcode, data)?;
                 match mcap::parse_record(opcode, data).map_err(|error| mcap_error(path, &error))? {
                     Record::Chunk { header, data } => file.chunk(&header, &data)?,
                     record => file.record(record)?,
@@ -87,6 +91,32 @@ fn read_trusting<S: Sink>(path: &Path, sink: &mut S) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// Refuses a record in which a text is longer than the record: the crate would take the memory for it first.
+fn check_texts(path: &Path, opcode: u8, body: &[u8]) -> Result<(), Error> {
+    // Where texts begin, and how many there are; each has its length in front. After those of a channel come pairs until its end.
+    let (first, count) = match opcode {
+        op::SCHEMA => (2, 3),
+        op::CHANNEL => (4, 2),
+        op::CHUNK => (28, 1),
+        _ => return Ok(()),
+    };
+    let mut rest = body.get(first..);
+    let text = |bytes: &mut Option<&[u8]>| {
+        *bytes = bytes.and_then(|bytes| {
+            let (length, after) = bytes.split_first_chunk::<4>()?;
+            after.get(usize::try_from(u32::from_le_bytes(*length)).ok()?..)
+        });
+    };
+    (0..count).for_each(|_| text(&mut rest));
+    if opcode == op::CHANNEL {
+        rest = rest.and_then(|bytes| bytes.get(4..));
+        while rest.is_some_and(|bytes| !bytes.is_empty()) {
+            text(&mut rest);
+        }
+    }
+    rest.map(|_| ()).ok_or_else(|| broken(path, &"a text is longer than the record that it stands in"))
 }
 
 /// Bytes that were unpacked, and their check sum.
@@ -143,6 +173,10 @@ impl<S: Sink> File<'_, S> {
             if count as u64 != length {
                 return Err(broken(self.path, &format!("a chunk ends within a record of {length} bytes")));
             }
+            if !READ.contains(&head[0]) {
+                continue;
+            }
+            check_texts(self.path, head[0], &body)?;
             let record = mcap::parse_record(head[0], &body).map_err(|error| mcap_error(self.path, &error))?;
             self.record(record)?;
         }

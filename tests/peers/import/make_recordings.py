@@ -4,13 +4,15 @@
     venv/bin/python tests/peers/import/make_recordings.py
 
 It reads four episodes of `tests/data/mujoco-logs/logs/set-003` and writes `tests/data/import/`: the part of the log itself
-(`original`), and the same measurements in other units, frames, orders and clocks. Each recording has a mapping `NAME.toml`
+(`original`), and the same measurements in other units, frames, orders and clocks. With `--whole DIR --source LOG` it writes all of another log
+to DIR, with the same mappings: long enough to be diagnosed. Such a log has no added weights, which not every recording tells. Each recording has a mapping `NAME.toml`
 beside it, written by hand; `crates/import-log/tests/peers.rs` imports each and compares with the original.
 
 The tool of that log has no orientation. Here it gets one, a made-up function of time, so that wrenches in its axes can be
 written; a sensor is mounted on it, turned and shifted. A tracker that sees the object is turned and shifted too.
 """
 
+import argparse
 import csv
 import json
 import pathlib
@@ -119,7 +121,7 @@ def read_part():
     with open(SOURCE / "samples.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     part = []
-    for episode in range(EPISODES):
+    for episode in sorted({int(row["episode"]) for row in rows})[:EPISODES]:
         part += [row for row in rows if int(row["episode"]) == episode][:ROWS]
     return part
 
@@ -305,7 +307,7 @@ def write_lerobot(all_ticks):
     pyarrow.parquet.write_table(table, folder / "data/chunk-000/file-000.parquet", compression="snappy")
     feature = lambda names: {"dtype": "float32", "shape": [len(names)], "names": names}
     info = {
-        "codebase_version": "v3.0", "robot_type": "rig", "total_episodes": EPISODES, "total_frames": len(frames), "fps": 50,
+        "codebase_version": "v3.0", "robot_type": "rig", "total_episodes": 1 + all_ticks[-1].episode, "total_frames": len(frames), "fps": 50,
         "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
         "features": {
             "observation.state": feature(state_names),
@@ -340,6 +342,19 @@ def write_csv(all_ticks):
 
 
 def main():
+    global OUT, SOURCE, EPISODES, ROWS, PAUSE_NANOS
+    parser = argparse.ArgumentParser(description="Writes recordings of one rig in the formats of others.")
+    parser.add_argument("--whole", type=pathlib.Path, metavar="DIR", help="the whole log, to this new folder")
+    parser.add_argument("--source", type=pathlib.Path, metavar="LOG", default=SOURCE, help="folder of that log")
+    arguments = parser.parse_args()
+    whole = arguments.whole
+    if whole is not None:
+        whole.mkdir(parents=True)
+        for path in OUT.glob("*.toml"):
+            shutil.copy(path, whole / path.name)
+        OUT, SOURCE, EPISODES, ROWS = whole.resolve(), arguments.source, 10**6, 10**6
+        # Longer than an episode.
+        PAUSE_NANOS = 10**12
     for path in OUT.glob("*"):
         if path.suffix != ".toml" and path.name != "README.md":
             shutil.rmtree(path) if path.is_dir() else path.unlink()
@@ -350,7 +365,7 @@ def main():
                   write_lerobot, write_csv]:
         write(all_ticks)
     total = sum(path.stat().st_size for path in OUT.rglob("*") if path.is_file())
-    print(f"{OUT.relative_to(ROOT)}: {total} bytes")
+    print(f"{OUT}: {total} bytes")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 pub mod checkpoint;
 pub mod dataset_shard;
+pub mod import_log;
 pub mod measured_log;
 pub mod model_toml;
 pub mod robot;
