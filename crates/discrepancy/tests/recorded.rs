@@ -52,24 +52,16 @@ fn a_tilted_table_is_named_with_its_slope_and_a_second_pass_finds_nothing() {
 }
 
 #[test]
-fn every_other_recorded_log_gets_the_right_answer() {
-    for set in ["set-000", "set-004", "set-005", "set-007", "set-008", "set-011"] {
+fn logs_of_other_shapes_and_effects_get_the_right_answer() {
+    // A ball, a cylinder, and commands that are not followed; the others are for `diagnose-benchmark`.
+    for set in ["set-000", "set-005", "set-007"] {
         let text = std::fs::read_to_string(logs().join("../truth").join(set).with_extension("json")).unwrap();
         let truth: serde_json::Value = serde_json::from_str(&text).unwrap();
         let (found, _) = report(set, None);
         let names: Vec<&str> = found.effects.iter().map(|effect| effect.name).collect();
-        match truth["effect"].as_str().unwrap() {
-            "none" => assert_eq!(found.verdict, Verdict::None, "{set}: {}", found.summary),
-            hidden => {
-                assert_eq!(
-                    (found.verdict, names.as_slice()),
-                    (Verdict::Effect, [hidden].as_slice()),
-                    "{set}: {}",
-                    found.summary
-                );
-                assert!(found.confusion_set.contains(&hidden), "{set}: {:?}", found.confusion_set);
-            }
-        }
+        let hidden = truth["effect"].as_str().unwrap();
+        assert_eq!((found.verdict, names), (Verdict::Effect, vec![hidden]), "{set}: {}", found.summary);
+        assert!(found.confusion_set.contains(&hidden), "{set}: {:?}", found.confusion_set);
     }
 }
 
@@ -161,7 +153,7 @@ fn what_is_in_the_way_of_few_episodes_leads_and_is_not_sure() {
 fn the_answer_does_not_depend_on_the_number_of_threads() {
     let set = "set-009";
     let mut log = measured_log::read(&logs().join(set)).unwrap();
-    log.episodes.truncate(8);
+    log.episodes.truncate(6);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         serde_json::to_string(&pool.install(|| of(&log, set, None).0)).unwrap()
