@@ -15,7 +15,7 @@ const WITH_PROGRAMS: [&str; 9] = [
     "discrepancy",
     "experiments",
     "import-log",
-    "prior",
+    "prior-training",
     "report",
     "scenario",
 ];

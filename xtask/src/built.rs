@@ -17,7 +17,7 @@ pub(crate) const BUILT: &str = "SURMISE_BUILT";
 /// The package of a program.
 fn package(binary: &str) -> &str {
     match binary {
-        "train" | "calibrate" => "prior",
+        "train" | "calibrate" => "prior-training",
         "eval" => "experiments",
         "demo" => "report",
         "record-log" | "diagnose-learn" => "diagnose-benchmark",

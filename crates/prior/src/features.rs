@@ -10,8 +10,6 @@
 //! rest has velocity exactly 0, and without a resolution the density could grow there without bound. Noise of the size
 //! of the resolution is added to the targets, so a calibrated network states at least that spread.
 
-mod episodes;
-
 use physics_model::state::BODY_LEN;
 use physics_model::theta::{CLASS_TARGETS, THETA_LEN, THETA_NAMES};
 use physics_model::{BodyState, ObjectShape, Theta};
@@ -22,8 +20,6 @@ use push_task::{Action, Particle, PushModel};
 
 use crate::mixture::Draw;
 use crate::{ClassTarget, Layout, Transform};
-
-pub use episodes::{first_event, layout_of_dataset, sequence};
 
 /// A suggested body that leans less than this stands upright, rad.
 const UPRIGHT_TOLERANCE_RAD: f64 = 0.3;
@@ -59,7 +55,8 @@ impl ActionInput {
         if layout.observation.ends_with(&action_names()) { Self::OneHot } else { Self::Off }
     }
 
-    fn columns(self, action: Option<usize>) -> impl Iterator<Item = f64> {
+    /// The columns of an action, or of none.
+    pub fn columns(self, action: Option<usize>) -> impl Iterator<Item = f64> {
         let columns = if self == Self::OneHot { ACTION_COUNT } else { 0 };
         (0..columns).map(move |column| if action == Some(column) { 1.0 } else { 0.0 })
     }
@@ -131,7 +128,8 @@ pub(crate) fn theta_of_targets(targets: &[f64], classes: &[usize]) -> Theta {
 }
 
 /// Θ as its targets are given, and which of them apply.
-pub(crate) fn theta_row(theta: &Theta) -> ([f64; THETA_LEN], [bool; THETA_LEN]) {
+#[must_use]
+pub fn theta_row(theta: &Theta) -> ([f64; THETA_LEN], [bool; THETA_LEN]) {
     let (mut values, mut applies) = (theta.continuous(), theta.applies());
     let obstacle = theta.obstacle.as_ref().map(|o| (9, o.shape, o.size_m));
     for (at, shape, size) in [Some((5, theta.object.shape, theta.object.size_m)), obstacle].into_iter().flatten() {
@@ -142,7 +140,9 @@ pub(crate) fn theta_row(theta: &Theta) -> ([f64; THETA_LEN], [bool; THETA_LEN]) 
     (values, applies)
 }
 
-fn from_names(
+/// What a prior takes in and gives out whose columns have these names.
+#[must_use]
+pub fn from_names(
     robot: &str,
     mut observation: Vec<String>,
     state: Vec<String>,
@@ -216,129 +216,7 @@ fn settle(body: &mut BodyState, shape: ObjectShape, size_m: [f64; 3], table_heig
 mod tests {
     use push_task::config::ForceSensing;
 
-    use dataset::{Episode, Schema};
-
     use super::*;
-
-    fn episode(classes: [u8; 2]) -> Episode {
-        let object = BodyState::at_rest([0.5, 0.1, -0.055], 0.4).to_array();
-        let mut turned = object;
-        turned[3..7].iter_mut().for_each(|q| *q = -*q);
-        let state = [vec![0.1; 7], object.to_vec(), turned.to_vec()].concat();
-        Episode {
-            episode: 0,
-            outcome: 1,
-            action: vec![-1, 2],
-            reward: vec![0.0, -1.0],
-            observation: vec![0.5; 40],
-            state: [state.clone(), state].concat(),
-            theta: vec![0.5, 0.01, 0.0, 0.0, 0.3, 0.08, 0.07, 0.09, 1.0, 0.04, 0.1, 0.0],
-            classes: classes.to_vec(),
-            events: vec![],
-        }
-    }
-
-    fn layout(input: ActionInput) -> Layout {
-        let names = observation_names(ForceSensing::Wrist, 7);
-        from_names("sawyer", names, State::names(7), THETA_NAMES.map(String::from).to_vec(), input)
-    }
-
-    #[test]
-    fn what_does_not_apply_is_masked() {
-        let layout = layout(ActionInput::Off);
-        let count = |classes| sequence(&layout, &episode(classes)).unwrap().mask.iter().sum::<f32>() / 2.0;
-        // 7 joints, 13 object, 5 + 3 of a box, 13 obstacle, 1 + 2 of a cylinder.
-        assert_eq!(count([0, 1]), 7.0 + 13.0 + 8.0 + 13.0 + 3.0);
-        // Sphere without obstacle: mass, depth of the centre of mass, friction, radius.
-        assert_eq!(count([2, 3]), 7.0 + 13.0 + 4.0);
-    }
-
-    #[test]
-    fn a_target_comes_back_as_the_particle_it_was_made_from() {
-        let (layout, episode) = (layout(ActionInput::Off), episode([0, 1]));
-        let sequence = sequence(&layout, &episode).unwrap();
-        assert!((f64::from(sequence.targets[33]) - 0.5_f64.ln()).abs() < 1e-6, "a mass is learnt as its logarithm");
-        let values: Vec<f64> = sequence.targets[..45].iter().map(|v| f64::from(*v)).collect();
-        let draw = Draw { values, classes: vec![0, 1], component: 0 };
-        let observation: Vec<f64> = episode.observation(0).iter().map(|v| f64::from(*v)).collect();
-        let particle = particle(&layout, &draw, &observation, 7, -0.1);
-        assert_eq!(particle.theta.classes(), [0, 1]);
-        assert!(
-            (particle.theta.object.mass_kg - 0.5).abs() < 1e-6
-                && (particle.theta.obstacle.as_ref().unwrap().mass_kg - 1.0).abs() < 1e-6
-        );
-        assert!((particle.theta.object.size_m[1] - 0.07).abs() < 1e-6);
-        // A cylinder of radius 4 cm and height 10 cm.
-        let obstacle = particle.theta.obstacle.as_ref().unwrap();
-        assert!((obstacle.size_m[0] - 0.04).abs() < 1e-6 && (obstacle.size_m[1] - 0.1).abs() < 1e-6, "{obstacle:?}");
-        assert!((particle.state.object.position_m[2] - (-0.055)).abs() < 1e-7, "rests at half its height");
-        // Up to five times the resolution.
-        assert!((particle.state.object.position_m[0] - 0.5).abs() < 0.005);
-        assert!((particle.state.object.yaw_rad() - 0.4).abs() < 0.06);
-        // The obstacle's quaternion was given with the other sign.
-        assert!((particle.state.obstacle.unwrap().yaw_rad() - 0.4).abs() < 0.06);
-    }
-
-    #[test]
-    fn measured_targets_are_differences_with_the_noise_of_the_resolution() {
-        let layout = layout(ActionInput::Off);
-        let measured = layout.transforms.iter().filter(|t| matches!(t, Transform::MinusObservation(_))).count();
-        assert_eq!(measured, 14, "7 joints and the object's pose");
-        // Null: noise of 1 mm about 0.5 − 0.5 = 0. n = 2 × 400 rows, standard error of the spread 2.5 %; tolerance 4 of them.
-        let mut squares = 0.0;
-        for number in 0..400 {
-            let mut episode = Episode { episode: number, ..episode([0, 1]) };
-            for row in 0..2 {
-                episode.observation[row * 20 + 13] = 0.5;
-            }
-            let sequence = sequence(&layout, &episode).unwrap();
-            squares += sequence.targets.iter().skip(7).step_by(45).map(|v| f64::from(*v).powi(2)).sum::<f64>();
-        }
-        assert!(((squares / 800.0).sqrt() / 0.001 - 1.0).abs() < 0.1, "{squares}");
-    }
-
-    #[test]
-    fn actions_are_one_hot_columns_behind_the_observation() {
-        let layout = layout(ActionInput::OneHot);
-        let sequence = sequence(&layout, &episode([0, 1])).unwrap();
-        assert_eq!(sequence.observations.len(), 2 * 30);
-        assert!(sequence.observations[20..30].iter().all(|v| *v == 0.0), "no action has led to the first row");
-        let second: Vec<f64> = sequence.observations[30..].iter().map(|v| f64::from(*v)).collect();
-        assert_eq!(second[20..], [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(input(&layout, Some(Action::ALL[2]), &second[..20]), second);
-        assert_eq!(input(&self::layout(ActionInput::Off), Some(Action::ALL[2]), &second[..20]), second[..20]);
-    }
-
-    #[test]
-    fn a_dataset_of_another_task_is_refused_by_its_key() {
-        let names = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
-        let good = Schema {
-            robot: "sawyer".into(),
-            observation: observation_names(ForceSensing::Wrist, 7),
-            action_count: ACTION_COUNT,
-            state: State::names(7),
-            theta: names(&THETA_NAMES),
-            classes: names(&["object_shape", "obstacle_shape"]),
-            events: vec![],
-        };
-        assert_eq!(layout_of_dataset(&good, ActionInput::Off).unwrap(), layout(ActionInput::Off));
-        type Case = (&'static str, fn(&mut Schema));
-        let bad: [Case; 5] = [
-            ("state", |s| s.state.truncate(20)),
-            ("state", |s| s.state.swap(0, 1)),
-            ("theta", |s| s.theta.truncate(11)),
-            ("classes", |s| s.classes.clear()),
-            ("action_count", |s| s.action_count = 4),
-        ];
-        for (key, change) in bad {
-            let mut schema = good.clone();
-            change(&mut schema);
-            let message = layout_of_dataset(&schema, ActionInput::Off).unwrap_err().to_string();
-            assert!(message.starts_with(&format!("dataset: schema.{key} is ")), "{message}");
-        }
-        let message = sequence(&layout(ActionInput::Off), &episode([0, 4])).unwrap_err().to_string();
-        assert_eq!(message, "dataset: obstacle_shape of episode 0 is class 4, expected one of 0 to 3");
-    }
 
     #[test]
     fn wild_draws_become_physical() {
@@ -348,7 +226,10 @@ mod tests {
         values[37] = 1.7;
         values[38..41].copy_from_slice(&[-0.1, 0.05, 0.05]);
         let draw = Draw { values, classes: vec![0, 3], component: 0 };
-        let particle = particle(&layout(ActionInput::Off), &draw, &[0.0; 20], 7, 0.0);
+        let names = observation_names(ForceSensing::Wrist, 7);
+        let layout =
+            from_names("sawyer", names, State::names(7), THETA_NAMES.map(String::from).to_vec(), ActionInput::Off);
+        let particle = particle(&layout, &draw, &[0.0; 20], 7, 0.0);
         assert!(physics_model::feasible::check_theta(&particle.theta).is_ok(), "{:?}", particle.theta);
         assert!(particle.state.obstacle.is_none());
     }

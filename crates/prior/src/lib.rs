@@ -120,7 +120,7 @@ pub fn default_folder(root: &std::path::Path, names: &[impl AsRef<str>], quick: 
         .unwrap_or_else(|| folder("assets/priors", last))
 }
 
-/// The project folder that a command line names, or the nearest one at or above `start`, else `start`. The programs of this crate need no
+/// The project folder that a command line names, or the nearest one at or above `start`, else `start`. The programs that train need no
 /// scenario, only a place for their default folders.
 ///
 /// # Errors

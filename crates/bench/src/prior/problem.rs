@@ -8,7 +8,7 @@ use pomdp::{Purpose, Rng, Seed};
 use prior::features::ActionInput;
 use prior::{
     ClassTarget, Layout, NetworkConfig, Normalisation, Parameters, Schedule, Sequence, TrainConfig, Trainer, Transform,
-    features, is_held_out,
+    is_held_out,
 };
 use rand::RngExt as _;
 use rand::seq::SliceRandom as _;
@@ -78,9 +78,12 @@ impl Problem {
     /// The dataset in `dir`.
     pub(crate) fn recorded(dir: &Path) -> Result<Self> {
         let reader = Reader::open(dir).with_context(|| format!("{}: no usable dataset", dir.display()))?;
-        let layout = features::layout_of_dataset(&reader.manifest().schema, ActionInput::Off)?;
-        let data =
-            reader.episodes()?.iter().map(|episode| features::sequence(&layout, episode)).collect::<Result<_, _>>()?;
+        let layout = prior_training::layout_of_dataset(&reader.manifest().schema, ActionInput::Off)?;
+        let data = reader
+            .episodes()?
+            .iter()
+            .map(|episode| prior_training::sequence(&layout, episode))
+            .collect::<Result<_, _>>()?;
         Ok(Self { layout, data, config: published(0.1, Some(10.0)) })
     }
 

@@ -75,7 +75,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         )
     })?;
     let manifest = reader.manifest();
-    let layout = features::layout_of_dataset(&manifest.schema, ActionInput::of(&checkpoint.layout))?;
+    let layout = prior_training::layout_of_dataset(&manifest.schema, ActionInput::of(&checkpoint.layout))?;
     let manifest_file = folder.join("prior.json");
     checkpoint.layout.check(&layout, &manifest_file)?;
     if checkpoint.provenance.get("dataset_seed") == Some(&manifest.seed.to_string()) {
@@ -90,8 +90,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     let memoryless = memoryless.transpose()?;
     let recorded = reader.episodes()?;
     let sequences: Vec<Sequence> =
-        recorded.iter().map(|episode| features::sequence(&layout, episode)).collect::<Result<_, _>>()?;
-    let first = |episode: &dataset::Episode, event| features::first_event(&manifest.schema, episode, event);
+        recorded.iter().map(|episode| prior_training::sequence(&layout, episode)).collect::<Result<_, _>>()?;
+    let first = |episode: &dataset::Episode, event| prior_training::first_event(&manifest.schema, episode, event);
     let episodes: Vec<Episode<'_>> = recorded
         .iter()
         .zip(&sequences)

@@ -10,7 +10,7 @@ use clap::Parser;
 use dataset::Reader;
 use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
-use prior::features::{self, ActionInput};
+use prior::features::ActionInput;
 use prior::{Layout, NetworkConfig, Schedule, Sequence, TrainConfig, Trainer, curve_csv, write_atomically};
 use program::{Failed, typed};
 
@@ -98,9 +98,9 @@ fn run(arguments: &Arguments) -> Result<bool> {
     }
     let recorded = reader.episodes()?;
     let input = if arguments.action_input { ActionInput::OneHot } else { ActionInput::Off };
-    let layout = features::layout_of_dataset(&manifest.schema, input)?;
+    let layout = prior_training::layout_of_dataset(&manifest.schema, input)?;
     let sequences: Vec<Sequence> =
-        recorded.iter().map(|episode| features::sequence(&layout, episode)).collect::<Result<_, _>>()?;
+        recorded.iter().map(|episode| prior_training::sequence(&layout, episode)).collect::<Result<_, _>>()?;
     drop(recorded);
     let config = TrainConfig {
         network: NetworkConfig { hidden: vec![128, 128], components: 10, memory: !arguments.memoryless },
