@@ -1,10 +1,10 @@
-//! Loss and gradient by hand: backpropagation through time on packed batches and the `gemm` crate.
+//! Loss and gradient by hand: backpropagation through time on packed batches and the `gemm` crates.
 //!
 //! Two products a step and layer, and otherwise only element-wise operations; automatic differentiation would record about a hundred small
 //! operations for each. It works on plain vectors and is generic over f32 (training) and f64 (tests). Tests hold it to
 //! finite differences and to the loss and gradient that PyTorch recorded.
 //!
-//! On one kind of CPU the same seed gives the same bytes for any number of threads. `gemm` picks its kernels by the
+//! On one kind of CPU the same seed gives the same bytes for any number of threads. They pick their kernels by the
 //! CPU's vector units (FMA, AVX-512), so another kind of CPU rounds differently.
 
 mod batch;

@@ -193,14 +193,19 @@ fn what_bounces_is_said_not_to() {
 }
 
 #[test]
-fn a_urdf_is_read_by_its_reader() {
+fn a_urdf_has_the_values_of_the_model_in_the_places_of_the_format() {
     let effects = vec![EffectConfig::ComOffset(ComOffset { share_x: 0.0, share_y: 0.1, share_z: 0.0 })];
     let text = urdf(&scene(solid(ObjectShape::Cylinder, [0.04, 0.1, 0.0]), effects));
-    let robot = urdf_rs::read_from_string(&text).unwrap();
-    let inertial = &robot.links[0].inertial;
-    assert_eq!(inertial.mass.value, 0.5);
-    close(&inertial.origin.xyz.0, &[0.0, 0.008, 0.0]);
-    close(&[inertial.inertia.izz], &[0.5 * 0.04 * 0.04 / 2.0]);
-    let urdf_rs::Geometry::Cylinder { radius, length } = robot.links[0].collision[0].geometry else { panic!("{text}") };
-    assert_eq!((radius, length), (0.04, 0.1));
+    let document = roxmltree::Document::parse(&text).unwrap();
+    let value = |path: &[&str], key: &str| -> Vec<f64> {
+        let root = document.root_element();
+        let found =
+            path.iter().fold(root, |node, name| node.children().find(|child| child.has_tag_name(*name)).expect(name));
+        found.attribute(key).expect(key).split_whitespace().map(|number| number.parse().unwrap()).collect()
+    };
+    assert_eq!(value(&["link", "inertial", "mass"], "value"), [0.5]);
+    close(&value(&["link", "inertial", "origin"], "xyz"), &[0.0, 0.008, 0.0]);
+    close(&value(&["link", "inertial", "inertia"], "izz"), &[0.5 * 0.04 * 0.04 / 2.0]);
+    let cylinder = ["link", "collision", "geometry", "cylinder"];
+    assert_eq!((value(&cylinder, "radius"), value(&cylinder, "length")), (vec![0.04], vec![0.1]));
 }

@@ -3,18 +3,15 @@
 use std::path::Path;
 
 use super::RobotError;
-use super::error::{joint_error, link_error};
-use super::xml;
+use super::model::{self, Urdf};
 
 /// Size of a file.
 const MOST_BYTES: u64 = 16 << 20;
-/// Depth of its elements; those of URDF are five deep.
-const MOST_LEVELS: usize = 100;
 /// Links or joints: each is compared with all others, and a chain of them is walked by a function that calls itself.
 const MOST_LINKS: usize = 1000;
 
-/// Reads a file of bounded size, depth and number of links.
-pub(super) fn read(path: &Path) -> Result<urdf_rs::Robot, RobotError> {
+/// Reads a file of bounded size and number of links.
+pub(super) fn read(path: &Path) -> Result<Urdf, RobotError> {
     let bytes = whole_file::read(path, MOST_BYTES)
         .map_err(|error| RobotError::Read { path: path.into(), source: error.source })?;
     let text = std::str::from_utf8(&bytes).map_err(|error| {
@@ -25,76 +22,52 @@ pub(super) fn read(path: &Path) -> Result<urdf_rs::Robot, RobotError> {
 }
 
 /// Parses the text of the file at `path`.
-fn parse(path: &Path, text: &str) -> Result<urdf_rs::Robot, RobotError> {
+pub(super) fn parse(path: &Path, text: &str) -> Result<Urdf, RobotError> {
     let refuse = |reason: &str| RobotError::Parse { path: path.into(), reason: whole_file::one_line(reason, 300) };
-    // The parser calls itself for each level, and so does what frees its tree.
-    if xml::nesting(text) > MOST_LEVELS {
-        return Err(refuse(&format!("expected elements at most {MOST_LEVELS} deep")));
-    }
     if let Some(problem) = other_format(text) {
         return Err(refuse(&problem));
     }
-    let text = &with_velocities(text);
-    let description = urdf_rs::read_from_string(text).map_err(|error| explain(path, text, &error.to_string()))?;
-    let found = description.links.len().max(description.joints.len());
+    let urdf = model::read(path, text)?;
+    let found = urdf.links.len().max(urdf.joints.len());
     if found > MOST_LINKS {
         return Err(refuse(&format!("expected at most {MOST_LINKS} links and joints, found {found}")));
     }
-    Ok(description)
+    Ok(urdf)
 }
 
 /// What a file is that is no URDF.
 fn other_format(text: &str) -> Option<String> {
     let expected = "expected a URDF file, whose outermost element is <robot>";
-    let Some(root) = xml::elements(text).next() else {
+    let Some(root) = first_element(text) else {
         let found = if text.trim().is_empty() { "an empty file" } else { "a text without elements" };
         return Some(format!("{expected}, found {found}"));
     };
-    let found = match root.name.to_ascii_lowercase().as_str() {
+    let found = match root.to_ascii_lowercase().as_str() {
         // Macros that nobody has expanded; a namespace alone is what xacro leaves behind.
-        "robot" if xml::elements(text).any(|e| e.name.starts_with("xacro:") || e.inside.contains("${")) => {
+        "robot" if text.contains("<xacro:") || text.contains("${") => {
             return Some("expected plain URDF, found xacro macros: run `xacro FILE > arm.urdf` first".into());
         }
         "robot" => return None,
         "mujoco" | "mujocoinclude" => "MJCF, the format of MuJoCo".to_string(),
         "sdf" => "SDF, the format of Gazebo".to_string(),
         "html" => "a web page: was the download refused?".to_string(),
-        _ => format!("<{}>", whole_file::one_line(root.name, 60)),
+        _ => format!("<{}>", whole_file::one_line(root, 60)),
     };
     Some(format!("{expected}, found {found}"))
 }
 
-/// The text in which every limit of a joint has a velocity: the format asks for one, many files have none, and nothing here uses it.
-fn with_velocities(text: &str) -> String {
-    let mut whole = String::with_capacity(text.len());
-    let mut done = 0;
-    for element in
-        xml::elements(text).filter(|element| element.name == "limit" && element.attribute("velocity").is_none())
-    {
-        whole += &text[done..element.name_end];
-        whole += " velocity=\"inf\"";
-        done = element.name_end;
-    }
-    whole + &text[done..]
-}
-
-/// Which link or joint the parser did not take, and why. The parser says why alone, so each is read for itself.
-fn explain(path: &Path, text: &str, reason: &str) -> RobotError {
-    let plain = |reason: &str| whole_file::one_line(&whole_file::plain(reason), 300);
-    for element in xml::elements(text).filter(|element| element.depth == 1 && ["joint", "link"].contains(&element.name))
-    {
-        let Some(part) = element.whole(text) else { continue };
-        if let Err(error) = urdf_rs::read_from_string(&format!("<robot name=\"part\">{part}</robot>")) {
-            let name = element.attribute("name").unwrap_or("without a name");
-            let problem = plain(&error.to_string());
-            return if element.name == "joint" {
-                joint_error(path, name, &problem)
-            } else {
-                link_error(path, name, &problem)
-            };
+/// Name of the outermost element: the first tag that is no comment and no declaration.
+fn first_element(text: &str) -> Option<&str> {
+    let mut rest = text;
+    loop {
+        rest = &rest[rest.find('<')? + 1..];
+        if let Some(comment) = rest.strip_prefix("!--") {
+            rest = &comment[comment.find("-->")?..];
+        } else if !rest.starts_with(['!', '?', '/']) {
+            let end = rest.find(|c: char| c.is_whitespace() || ['/', '>'].contains(&c)).unwrap_or(rest.len());
+            return Some(&rest[..end]);
         }
     }
-    RobotError::Parse { path: path.into(), reason: plain(reason) }
 }
 
 #[cfg(test)]
@@ -116,12 +89,12 @@ mod tests {
             ("<?xml version=\"1.0\"?>".into(), "found a text without elements"),
             (robot("<xacro:include filename=\"a\"/>"), "run `xacro FILE > arm.urdf`"),
             (robot("<link name=\"${prefix}a\"/>"), "found xacro macros"),
-            (robot(&JOINT.replace("<child link=\"b\"/>", "")), "joint \"elbow\" of arm.urdf: `child` is missing"),
+            (robot(&JOINT.replace("<child link=\"b\"/>", "")), "joint \"elbow\" of arm.urdf: <child> is missing"),
             (robot(&JOINT.replace("\"5\"", "\"strong\"")), "joint \"elbow\" of arm.urdf: "),
-            (robot(&JOINT.replace("revolute", "hinge")), "there is no choice `hinge`"),
+            (robot(&JOINT.replace("revolute", "hinge")), "is of type \"hinge\", expected one of revolute, "),
             (
                 robot("<link name=\"hand\"><inertial><mass/></inertial></link>"),
-                "link \"hand\" of arm.urdf: `value` is missing",
+                "link \"hand\" of arm.urdf: <inertial> has no <inertia>",
             ),
             (robot("<link name=\"hand\">").replace("</robot>", ""), "arm.urdf"),
         ];
@@ -146,7 +119,7 @@ mod tests {
         let long =
             format!("<robot name=\"a\"><link name=\"a\"><inertial><origin xyz=\"{}\u{1}\n\"/>", "a".repeat(20_000));
         for (text, expected) in
-            [(deep, "100 deep"), (many, "1000 links"), (long, "arm.urdf"), (String::new(), "arm.urdf")]
+            [(deep, "arm.urdf"), (many, "1000 links"), (long, "arm.urdf"), (String::new(), "arm.urdf")]
         {
             std::fs::write(&path, text).unwrap();
             let message = read(&path).unwrap_err().to_string();

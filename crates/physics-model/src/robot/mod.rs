@@ -16,9 +16,9 @@ mod dynamics;
 mod error;
 mod file;
 mod ik;
+mod model;
 mod shapes;
 mod urdf;
-mod xml;
 
 use std::path::Path;
 
@@ -73,7 +73,7 @@ impl Robot {
         Self::build(config, description, &path)
     }
 
-    fn build(config: &RobotConfig, description: urdf_rs::Robot, path: &Path) -> Result<Self, RobotError> {
+    fn build(config: &RobotConfig, description: model::Urdf, path: &Path) -> Result<Self, RobotError> {
         let arm = urdf::Arm::new(config, description, path)?;
         config.check_values(&arm.limits)?;
         let names: Vec<String> = arm.links.keys().cloned().collect();

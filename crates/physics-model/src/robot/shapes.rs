@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use urdf_rs::Geometry;
 
 use super::chain::Frame;
+use super::model::{Geometry, Link};
 
 /// A collision primitive, fixed in the frame of `tool_link`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,17 +49,17 @@ struct Ball {
 /// # Errors
 ///
 /// A sentence, if a shape is a box or a mesh or has a radius that is not positive.
-pub(super) fn link_shapes(link: &urdf_rs::Link, target_from_link: &Frame) -> Result<Vec<ToolShape>, String> {
+pub(super) fn link_shapes(link: &Link, target_from_link: &Frame) -> Result<Vec<ToolShape>, String> {
     let mut balls = Vec::new();
     let mut cylinders = Vec::new();
     let mut shapes = Vec::new();
-    for collision in &link.collision {
-        let origin = Frame::from_xyz_rpy(collision.origin.xyz.0, collision.origin.rpy.0);
+    for (origin, geometry) in &link.collisions {
+        let origin = Frame::from_xyz_rpy(origin.xyz, origin.rpy);
         let target_from_shape = target_from_link.then(&origin);
-        let (radius, length) = match &collision.geometry {
+        let (radius, length) = match geometry {
             Geometry::Sphere { radius } => (*radius, 0.0),
             Geometry::Cylinder { radius, length } | Geometry::Capsule { radius, length } => (*radius, *length),
-            Geometry::Box { .. } | Geometry::Mesh { .. } => {
+            Geometry::Other => {
                 return Err("collision is a box or a mesh, expected sphere, cylinder or capsule on the tool".into());
             }
         };
@@ -71,7 +71,7 @@ pub(super) fn link_shapes(link: &urdf_rs::Link, target_from_link: &Frame) -> Res
             ));
         }
         let end = |side: f64| target_from_shape.point(&Vector3::new(0.0, 0.0, side * length / 2.0));
-        match &collision.geometry {
+        match geometry {
             Geometry::Sphere { .. } => balls.push(Ball { center: end(0.0), radius, absorbed: false }),
             Geometry::Capsule { .. } => shapes.push(capsule(end(-1.0), end(1.0), radius)),
             _ => cylinders.push((end(-1.0), end(1.0), radius)),
@@ -117,7 +117,8 @@ mod tests {
             .map(|(xyz, g)| format!("<collision><origin xyz=\"{xyz}\"/><geometry><{g}/></geometry></collision>"))
             .collect();
         let text = format!("<robot name=\"r\"><link name=\"hand\">{body}</link></robot>");
-        link_shapes(&urdf_rs::read_from_string(&text).expect("URDF").links[0], &Frame::identity())
+        let urdf = super::super::file::parse(std::path::Path::new("hand.urdf"), &text).expect("URDF");
+        link_shapes(&urdf.links[0], &Frame::identity())
     }
 
     #[test]

@@ -39,7 +39,8 @@ fn config() -> RobotConfig {
 }
 
 fn build(config: &RobotConfig, text: &str) -> Result<Robot, RobotError> {
-    Robot::build(config, urdf_rs::read_from_string(text).expect("URDF"), Path::new("small.urdf"))
+    let path = Path::new("small.urdf");
+    Robot::build(config, file::parse(path, text).expect("URDF"), path)
 }
 
 fn message(change: impl FnOnce(&mut RobotConfig), text: &str) -> String {

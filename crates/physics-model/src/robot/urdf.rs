@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
-use urdf_rs::JointType;
 
 use super::chain::{Chain, Frame, Inertia, Segment};
 use super::error::{joint_error, link_error, listed, quoted, unknown_link};
+use super::model::{Joint, JointKind, Link, Urdf};
 use super::shapes::{ToolShape, link_shapes};
 use super::{JointLimit, RobotConfig, RobotError};
 use crate::state::MAX_JOINTS;
@@ -33,21 +33,21 @@ pub(super) struct Arm {
     pub(super) chain: Chain,
     pub(super) limits: Vec<JointLimit>,
     pub(super) links: BTreeMap<String, Placed>,
-    description: urdf_rs::Robot,
+    description: Urdf,
 }
 
 impl Arm {
     /// Builds the chain of `config.actuated_joints` below `config.base_link`.
-    pub(super) fn new(config: &RobotConfig, description: urdf_rs::Robot, path: &Path) -> Result<Self, RobotError> {
+    pub(super) fn new(config: &RobotConfig, description: Urdf, path: &Path) -> Result<Self, RobotError> {
         let joints = joint_table(&description, path)?;
         check_names(config, &joints, path)?;
         if !description.links.iter().any(|link| link.name == config.base_link) {
             let names = description.links.iter().map(|link| link.name.as_str());
             return Err(unknown_link(path, "base_link", &config.base_link, names));
         }
-        let mut children: BTreeMap<&str, Vec<&urdf_rs::Joint>> = BTreeMap::new();
+        let mut children: BTreeMap<&str, Vec<&Joint>> = BTreeMap::new();
         for joint in &description.joints {
-            children.entry(&joint.parent.link).or_default().push(joint);
+            children.entry(&joint.parent).or_default().push(joint);
         }
         let mut arm = Walk { config, path, children, links: BTreeMap::new(), segments: Vec::new(), limits: Vec::new() };
         arm.visit(&config.base_link, None, &Frame::identity())?;
@@ -101,7 +101,7 @@ impl Arm {
 struct Walk<'a> {
     config: &'a RobotConfig,
     path: &'a Path,
-    children: BTreeMap<&'a str, Vec<&'a urdf_rs::Joint>>,
+    children: BTreeMap<&'a str, Vec<&'a Joint>>,
     links: BTreeMap<String, Placed>,
     segments: Vec<Segment>,
     limits: Vec<JointLimit>,
@@ -123,7 +123,7 @@ impl<'a> Walk<'a> {
             {
                 return true;
             }
-            open.extend(children.iter().map(|joint| joint.child.link.as_str()));
+            open.extend(children.iter().map(|joint| joint.child.as_str()));
         }
         false
     }
@@ -134,12 +134,11 @@ impl<'a> Walk<'a> {
         if self.links.insert(link.to_owned(), placed).is_some() {
             return Err(link_error(self.path, link, "has two parents, expected a tree"));
         }
-        let children: Vec<&'a urdf_rs::Joint> = self.children.get(link).cloned().unwrap_or_default();
+        let children: Vec<&'a Joint> = self.children.get(link).cloned().unwrap_or_default();
         for joint in children {
-            let origin = Frame::from_xyz_rpy(joint.origin.xyz.0, joint.origin.rpy.0);
+            let origin = Frame::from_xyz_rpy(joint.origin.xyz, joint.origin.rpy);
             if !believable(&origin) {
-                let problem =
-                    format!("origin is {:?}, expected finite values within {LONGEST_M} m", joint.origin.xyz.0);
+                let problem = format!("origin is {:?}, expected finite values within {LONGEST_M} m", joint.origin.xyz);
                 return Err(joint_error(self.path, &joint.name, &problem));
             }
             let segment_from_joint = segment_from_link.then(&origin);
@@ -155,12 +154,12 @@ impl<'a> Walk<'a> {
                 self.limits.push(limit(joint, self.path)?);
                 let mount = segment_from_joint.then(&turn);
                 self.segments.push(Segment { mount, inertia: Inertia::zero() });
-                self.visit(&joint.child.link, Some(index), &turn.inverse())?;
-            } else if is_free(joint) && !self.leads_to_the_arm(&joint.child.link) {
+                self.visit(&joint.child, Some(index), &turn.inverse())?;
+            } else if is_free(joint) && !self.leads_to_the_arm(&joint.child) {
                 // An object beside the arm: what it does is not the arm's business.
             } else {
                 let frozen = frozen(joint, self.config.locked_joints.get(&joint.name), self.path)?;
-                self.visit(&joint.child.link, segment, &segment_from_joint.then(&frozen))?;
+                self.visit(&joint.child, segment, &segment_from_joint.then(&frozen))?;
             }
         }
         Ok(())
@@ -168,48 +167,44 @@ impl<'a> Walk<'a> {
 }
 
 /// Whether a joint leaves what hangs on it free in more than one direction.
-fn is_free(joint: &urdf_rs::Joint) -> bool {
-    matches!(joint.joint_type, JointType::Floating | JointType::Planar | JointType::Spherical)
+fn is_free(joint: &Joint) -> bool {
+    matches!(joint.kind, JointKind::Floating | JointKind::Planar | JointKind::Spherical)
 }
 
 /// What a joint is called that cannot be used, and what would do.
-fn unusable(kind: &JointType, expected: &str) -> String {
-    let kind = format!("{kind:?}").to_lowercase();
-    format!("is {kind}, expected {expected}")
+fn unusable(kind: &JointKind, expected: &str) -> String {
+    format!("is {}, expected {expected}", kind.name())
 }
 
 /// Joints by name, checked to be unique and to form no loop of links.
-fn joint_table<'a>(
-    description: &'a urdf_rs::Robot,
-    path: &Path,
-) -> Result<BTreeMap<&'a str, &'a urdf_rs::Joint>, RobotError> {
+fn joint_table<'a>(description: &'a Urdf, path: &Path) -> Result<BTreeMap<&'a str, &'a Joint>, RobotError> {
     let mut joints = BTreeMap::new();
     let mut parents = BTreeMap::new();
     for joint in &description.joints {
         if joints.insert(joint.name.as_str(), joint).is_some() {
             return Err(joint_error(path, &joint.name, "occurs twice, expected unique names"));
         }
-        for link in [&joint.parent.link, &joint.child.link] {
+        for link in [&joint.parent, &joint.child] {
             if !description.links.iter().any(|l| l.name == *link) {
                 return Err(joint_error(path, &joint.name, &format!("connects link {link:?}, which does not exist")));
             }
         }
-        if let Some(other) = parents.insert(joint.child.link.as_str(), joint.name.as_str()) {
+        if let Some(other) = parents.insert(joint.child.as_str(), joint.name.as_str()) {
             let problem = format!("has two parent joints, {other:?} and {:?}, expected a tree", joint.name);
-            return Err(link_error(path, &joint.child.link, &problem));
+            return Err(link_error(path, &joint.child, &problem));
         }
     }
     Ok(joints)
 }
 
-fn check_names(config: &RobotConfig, joints: &BTreeMap<&str, &urdf_rs::Joint>, path: &Path) -> Result<(), RobotError> {
+fn check_names(config: &RobotConfig, joints: &BTreeMap<&str, &Joint>, path: &Path) -> Result<(), RobotError> {
     let actuated = config.actuated_joints.iter().map(|name| ("actuated_joints", name));
     let locked = config.locked_joints.keys().map(|name| ("locked_joints", name));
     for (key, name) in actuated.chain(locked) {
         if !joints.contains_key(name.as_str()) {
             let movable =
-                |kind: &JointType| matches!(kind, JointType::Revolute | JointType::Continuous | JointType::Prismatic);
-            let moving = joints.values().filter(|j| movable(&j.joint_type)).map(|j| j.name.as_str());
+                |kind: &JointKind| matches!(kind, JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic);
+            let moving = joints.values().filter(|j| movable(&j.kind)).map(|j| j.name.as_str());
             let known = listed(moving);
             return Err(RobotError::UnknownJoint { path: path.into(), key, name: quoted(name), known });
         }
@@ -231,17 +226,17 @@ fn check_names(config: &RobotConfig, joints: &BTreeMap<&str, &urdf_rs::Joint>, p
 }
 
 /// Joint frame ← link frame of a joint that does not move here.
-fn frozen(joint: &urdf_rs::Joint, locked: Option<&f64>, path: &Path) -> Result<Frame, RobotError> {
-    let position = match (&joint.joint_type, locked) {
-        (JointType::Fixed, None) => return Ok(Frame::identity()),
-        (JointType::Revolute | JointType::Continuous | JointType::Prismatic, Some(position)) => *position,
+fn frozen(joint: &Joint, locked: Option<&f64>, path: &Path) -> Result<Frame, RobotError> {
+    let position = match (&joint.kind, locked) {
+        (JointKind::Fixed, None) => return Ok(Frame::identity()),
+        (JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic, Some(position)) => *position,
         (kind, Some(_)) => {
             let problem = unusable(kind, "revolute, continuous or prismatic in robot.locked_joints");
             return Err(joint_error(path, &joint.name, &problem));
         }
         (kind, None) => {
             let expected = match kind {
-                JointType::Revolute | JointType::Continuous | JointType::Prismatic => {
+                JointKind::Revolute | JointKind::Continuous | JointKind::Prismatic => {
                     "it in robot.actuated_joints, or in robot.locked_joints with a value"
                 }
                 _ => "fixed, revolute, continuous or prismatic between base and tool: give it another type in the URDF",
@@ -250,17 +245,17 @@ fn frozen(joint: &urdf_rs::Joint, locked: Option<&f64>, path: &Path) -> Result<F
             return Err(joint_error(path, &joint.name, &problem));
         }
     };
-    let (lower, upper) = match joint.joint_type {
-        JointType::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
+    let (lower, upper) = match joint.kind {
+        JointKind::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
         _ => (joint.limit.lower, joint.limit.upper),
     };
-    let most = if joint.joint_type == JointType::Prismatic { LONGEST_M } else { f64::MAX };
+    let most = if joint.kind == JointKind::Prismatic { LONGEST_M } else { f64::MAX };
     if !(position.abs() <= most && (lower..=upper).contains(&position)) {
         let problem = format!("is locked at {position}, expected {lower} to {upper}");
         return Err(joint_error(path, &joint.name, &problem));
     }
     let axis = unit_axis(joint, path)?;
-    Ok(if joint.joint_type == JointType::Prismatic {
+    Ok(if joint.kind == JointKind::Prismatic {
         Frame { rotation: Matrix3::identity(), position: *axis * position }
     } else {
         Frame { rotation: *Rotation3::from_axis_angle(&axis, position).matrix(), position: Vector3::zeros() }
@@ -278,20 +273,20 @@ fn joint_from_axis(axis: &Unit<Vector3<f64>>) -> Frame {
     Frame { rotation: *rotation.matrix(), position: Vector3::zeros() }
 }
 
-fn unit_axis(joint: &urdf_rs::Joint, path: &Path) -> Result<Unit<Vector3<f64>>, RobotError> {
-    let axis = Vector3::from(joint.axis.xyz.0);
+fn unit_axis(joint: &Joint, path: &Path) -> Result<Unit<Vector3<f64>>, RobotError> {
+    let axis = Vector3::from(joint.axis);
     Unit::try_new(axis, 1e-6)
         // An overflow of the norm leaves nothing of the direction.
         .filter(|unit| (unit.norm() - 1.0).abs() < 1e-6)
-        .ok_or_else(|| joint_error(path, &joint.name, &format!("axis is {:?}, expected a direction", joint.axis.xyz.0)))
+        .ok_or_else(|| joint_error(path, &joint.name, &format!("axis is {:?}, expected a direction", joint.axis)))
 }
 
-fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> {
-    let (lower_rad, upper_rad) = match joint.joint_type {
-        JointType::Revolute => (joint.limit.lower, joint.limit.upper),
-        JointType::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
+fn limit(joint: &Joint, path: &Path) -> Result<JointLimit, RobotError> {
+    let (lower_rad, upper_rad) = match joint.kind {
+        JointKind::Revolute => (joint.limit.lower, joint.limit.upper),
+        JointKind::Continuous => (f64::NEG_INFINITY, f64::INFINITY),
         _ => {
-            let problem = unusable(&joint.joint_type, "revolute or continuous in robot.actuated_joints");
+            let problem = unusable(&joint.kind, "revolute or continuous in robot.actuated_joints");
             return Err(joint_error(path, &joint.name, &problem));
         }
     };
@@ -305,10 +300,10 @@ fn limit(joint: &urdf_rs::Joint, path: &Path) -> Result<JointLimit, RobotError> 
     Ok(JointLimit { lower_rad, upper_rad, velocity_rps, effort_nm })
 }
 
-fn inertia(link: &urdf_rs::Link, path: &Path) -> Result<Inertia, RobotError> {
-    let (mass_kg, i) = (link.inertial.mass.value, &link.inertial.inertia);
-    let origin = Frame::from_xyz_rpy(link.inertial.origin.xyz.0, link.inertial.origin.rpy.0);
-    let moment = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+fn inertia(link: &Link, path: &Path) -> Result<Inertia, RobotError> {
+    let (mass_kg, [ixx, ixy, ixz, iyy, iyz, izz]) = (link.inertial.mass_kg, link.inertial.inertia);
+    let origin = Frame::from_xyz_rpy(link.inertial.origin.xyz, link.inertial.origin.rpy);
+    let moment = Matrix3::new(ixx, ixy, ixz, ixy, iyy, iyz, ixz, iyz, izz);
     let inert = moment.iter().all(|v| v.abs() <= MOST_INERT_KGM2);
     if !((0.0..=HEAVIEST_KG).contains(&mass_kg) && inert && believable(&origin)) {
         let problem = format!(

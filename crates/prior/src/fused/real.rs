@@ -2,6 +2,8 @@
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
+use gemm_common::Parallelism;
+
 /// Defines a function that is compiled for the baseline, for AVX2 and for AVX-512, and picks at run time.
 ///
 /// The bodies are element by element without fused multiply-add, so all give the same bits.
@@ -42,6 +44,30 @@ macro_rules! wide {
 }
 pub(crate) use wide;
 
+/// A product of matrices as the gemm crates have it: rows, columns and inner length; the target with its strides from column to column and from row to row, and whether
+/// it is added to; left and right with theirs; factors of target and product; what is conjugated; threads.
+pub(super) type Kernel<T> = unsafe fn(
+    usize,
+    usize,
+    usize,
+    *mut T,
+    isize,
+    isize,
+    bool,
+    *const T,
+    isize,
+    isize,
+    *const T,
+    isize,
+    isize,
+    T,
+    T,
+    bool,
+    bool,
+    bool,
+    Parallelism,
+);
+
 /// f32 or f64.
 ///
 /// The f32 functions are branch-free polynomials (a few units in the last place) that the compiler vectorises; they use no
@@ -64,6 +90,8 @@ pub trait Real:
     const ONE: Self;
     /// 0.
     const ZERO: Self;
+    /// The product of matrices for this processor.
+    fn kernel() -> Kernel<Self>;
     /// Nearest value.
     fn from_f64(value: f64) -> Self;
     /// Exact or nearest value.
@@ -93,6 +121,10 @@ impl Real for f64 {
     const ONE: Self = 1.0;
     const ZERO: Self = 0.0;
 
+    fn kernel() -> Kernel<Self> {
+        gemm_f64::gemm::f64::get_gemm_fn()
+    }
+
     fn from_f64(value: f64) -> Self {
         value
     }
@@ -117,6 +149,10 @@ impl Real for f64 {
 impl Real for f32 {
     const ONE: Self = 1.0;
     const ZERO: Self = 0.0;
+
+    fn kernel() -> Kernel<Self> {
+        gemm_f32::gemm::f32::get_gemm_fn()
+    }
 
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
@@ -209,7 +245,7 @@ impl<'a, T> Matrix<'a, T> {
 /// `target (+)= left · right`, where row i of `target` starts at `i · target_stride`.
 ///
 /// Runs on one thread, so the result does not depend on the number of threads.
-#[expect(unsafe_code, reason = "the gemm crate takes raw pointers; the asserts above the call bound every access")]
+#[expect(unsafe_code, reason = "the gemm crates take raw pointers; the asserts above the call bound every access")]
 pub(crate) fn product<T: Real>(
     target: &mut [T],
     target_stride: usize,
@@ -228,28 +264,29 @@ pub(crate) fn product<T: Real>(
     );
     assert!((rows - 1) * target_stride + columns <= target.len(), "target too short");
     assert!(left.reach() <= left.data.len() && right.reach() <= right.data.len(), "operand too short");
+    // The kernels want columns of the target that are contiguous, so the transposed product is asked for: rightᵀ · leftᵀ.
     // SAFETY: all accesses lie within the slices by the asserts; `target` is borrowed mutably, so it aliases neither operand.
     unsafe {
-        gemm::gemm(
-            rows,
+        T::kernel()(
             columns,
+            rows,
             inner,
             target.as_mut_ptr(),
-            1,
             target_stride as isize,
+            1,
             accumulate,
-            left.data.as_ptr(),
-            left.column_stride as isize,
-            left.row_stride as isize,
             right.data.as_ptr(),
-            right.column_stride as isize,
             right.row_stride as isize,
+            right.column_stride as isize,
+            left.data.as_ptr(),
+            left.row_stride as isize,
+            left.column_stride as isize,
             T::ONE,
             T::ONE,
             false,
             false,
             false,
-            gemm::Parallelism::None,
+            Parallelism::None,
         );
     }
 }
