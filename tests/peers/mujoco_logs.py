@@ -756,7 +756,7 @@ def main():
     parser.add_argument("--all", action="store_true", help="one of each, ten of none")
     parser.add_argument("--actions", choices=("designed", "passive"), default="designed")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--thin", type=int, default=1, help="ticks of 10 ms in a tick of the log")
+    parser.add_argument("--thin", type=float, default=1, help="ticks of 10 ms in a tick of the log; 0.01: 10 kHz")
     parser.add_argument("--episodes", type=int, help="fewer than the 38 (passive: 40)")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()

@@ -32,6 +32,7 @@ use crate::simulator::{Hypothesis, Simulator};
 use crate::split::{Compared, HeldOut, LEAST_FITTED, Split, ranking};
 use crate::study::Study;
 use crate::terms::{LackingForce, lacking_force};
+use crate::thin::{Thinned, thinned};
 use crate::touch::{ContactGap, contact_gap};
 use crate::trial::groups;
 use crate::units::Units;
@@ -191,6 +192,8 @@ pub struct Diagnosis {
     pub rollouts: usize,
     /// Episodes that cannot be simulated: without a pose of the object, or without a row after it.
     pub left_out: Vec<u64>,
+    /// What of the log is simulated.
+    pub thinned: Thinned,
     /// Numbers of the fitted episodes in the log.
     pub fitted_ids: Vec<u64>,
     /// Places of the pieces of each of them.
@@ -256,7 +259,8 @@ fn diagnose_among(
     let tunables = nominal.tunables.clone();
     // A sensor that is not there measures nothing.
     let alive = without_dead(log);
-    let prepared = Prepared::new(alive.as_ref().unwrap_or(log), name, nominal, LEAST_FITTED)?;
+    let (log, thinned) = thinned(alive.as_ref().unwrap_or(log), nominal.has_tool(), settings.seed);
+    let prepared = Prepared::new(&log, name, nominal, LEAST_FITTED)?;
     let Prepared { log, nominal, noise, units } = &prepared;
     let Compared { trials, fitted, choosing, reported, left_out } = Compared::new(log, name, nominal, noise, settings)?;
     let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
@@ -292,7 +296,7 @@ fn diagnose_among(
     simulator.stage("fitting effects");
     let found = search.effects(&screening, &null, &episodes);
     let noise = noise.all().map(|noise| noise.in_units(units)).collect();
-    conclude(&search, found, episodes, About { log: name, units: *units, tunables, noise, left_out })
+    conclude(&search, found, episodes, About { log: name, units: *units, tunables, noise, left_out, thinned })
 }
 
 /// What a diagnosis says of its log.
@@ -302,6 +306,7 @@ struct About<'a> {
     tunables: Vec<Tunable>,
     noise: Vec<SensorNoise>,
     left_out: Vec<u64>,
+    thinned: Thinned,
 }
 
 fn no_numbers(log: &str) -> Error {
@@ -376,6 +381,7 @@ fn conclude(
         contact_gap: None,
         rollouts: 0,
         left_out: about.left_out,
+        thinned: about.thinned,
         fitted_ids: episodes.fitted.iter().map(|group| simulator.trials[chosen[group.start]].id).collect(),
         pieces: episodes.fitted,
     };

@@ -75,6 +75,7 @@ pub mod split;
 mod stamps;
 pub mod study;
 pub mod terms;
+pub mod thin;
 pub mod touch;
 pub mod trial;
 mod units;

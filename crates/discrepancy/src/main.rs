@@ -191,6 +191,9 @@ fn print_summary(report: &Report) {
         let (channel, phase) = (cell.channel.name(), cell.phase.name());
         program::out!("  {:3.0} % of the gap: {channel}, {phase} (p = {:.3})", 100.0 * cell.share, cell.p_value);
     }
+    if let Some(sentence) = report.thinned.sentence() {
+        program::out!("  {sentence}");
+    }
     if let Some(sentence) = report.left_out_sentence() {
         program::out!("  {sentence}");
     }

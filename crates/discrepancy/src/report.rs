@@ -17,6 +17,7 @@ use crate::rival::Rival;
 use crate::separate;
 use crate::split::{Plain, Split};
 use crate::terms::LackingForce;
+use crate::thin::Thinned;
 use crate::touch::ContactGap;
 use crate::verdict::closed_fraction;
 use crate::warning::{Warning, check, held_fixed, warnings};
@@ -164,6 +165,8 @@ pub struct Report {
     pub fold: Option<[usize; 2]>,
     /// Episodes of the log that cannot be simulated: without a pose of the object, or without a row after it.
     pub left_out: Vec<u64>,
+    /// What of the log was simulated: rows a tick, the tick (s), episodes out of how many.
+    pub thinned: Thinned,
     /// Simulated episodes of the search; what [`Self::warn`] simulates is not counted.
     pub rollouts: usize,
     /// Duration, s.
@@ -318,6 +321,7 @@ impl Report {
             seed: settings.seed,
             fold: settings.fold.map(|[part, parts]| [part + 1, parts]),
             left_out: diagnosis.left_out.clone(),
+            thinned: diagnosis.thinned,
             rollouts: diagnosis.rollouts,
             seconds,
         }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use crate::heldout::{Explanation, mean_squares, retuned};
 use crate::noise::{NoiseLevels, Source};
 use crate::nominal::Nominal;
+use crate::thin::thinned;
 
 /// Readings that are simulated, at most.
 const SIMULATED: usize = 3;
@@ -54,7 +55,11 @@ pub fn check(log: &Log, tool: &RigTool) -> Check {
 /// The suspicions of a check, each with what held-out episodes say of the likeliest way in which the log may be meant: one simulated pass each.
 #[must_use]
 pub fn warnings(log: &Log, nominal: &Nominal, check: &Check, seed: u64) -> Vec<Warning> {
-    let error = |log: &Log, nominal: &Nominal| mean_squares(log, nominal, &[Explanation::of(nominal)], seed)[0];
+    let error = |log: &Log, nominal: &Nominal| {
+        let (log, _) = thinned(log, nominal.has_tool(), seed);
+        let nominal = nominal.clone().with_period_secs(log.header.period_secs);
+        mean_squares(&log, &nominal, &[Explanation::of(&nominal)], seed)[0]
+    };
     let mut own = None;
     let mut simulated = 0;
     check
@@ -85,7 +90,7 @@ pub fn warnings(log: &Log, nominal: &Nominal, check: &Check, seed: u64) -> Vec<W
 /// Numbers given as exact that, given a spread, would explain as much as what was found: `before` and `after` are the held-out errors of the answer.
 #[must_use]
 pub fn held_fixed(log: &Log, nominal: &Nominal, [before, after]: [f64; 2], seed: u64) -> Option<Warning> {
-    let mut loose = log.clone();
+    let mut loose = thinned(log, nominal.has_tool(), seed).0.into_owned();
     let mut names: Vec<(&str, f64)> = Vec::new();
     let object = &mut loose.header.object;
     for (key, number) in [("object.mass_kg", &mut object.mass_kg), ("table.friction", &mut loose.header.table.friction)]

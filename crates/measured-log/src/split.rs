@@ -35,7 +35,8 @@ impl Log {
     }
 
     /// Indices of the episodes by their tickets.
-    fn shuffled(&self, seed: u64) -> Vec<usize> {
+    #[must_use]
+    pub fn shuffled(&self, seed: u64) -> Vec<usize> {
         let mut tickets: Vec<(u64, usize)> =
             self.episodes.iter().enumerate().map(|(index, episode)| (ticket(seed, episode.id), index)).collect();
         tickets.sort_unstable();

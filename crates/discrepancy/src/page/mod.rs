@@ -92,12 +92,13 @@ fn verdict(name: &str, report: &Report, words: &Words) -> Markup {
 fn foot(report: &Report, words: &Words) -> Markup {
     let fold = report.fold.map(|[part, parts]| format!(", part {part} of {parts} held out")).unwrap_or_default();
     let left_out = report.left_out_sentence().map(|sentence| format!(" {sentence}.")).unwrap_or_default();
+    let thinned = report.thinned.sentence().map(|sentence| format!(" {sentence}.")).unwrap_or_default();
     // Marked before the list is made.
     let last = html! {
         p.soft {
             (words.mark_as("seed", "Seed")) " " (report.seed) (fold) "; " (report.rollouts) " "
             (words.mark_as("simulated episode", "simulated episodes")) ", " (fixed(report.seconds, 1)) " s. Version "
-            (report.version) " of the contract of report.json. " (report.split.sentence()) " " (report.noise_sentence()) (left_out)
+            (report.version) " of the contract of report.json. " (report.split.sentence()) " " (report.noise_sentence()) (left_out) (thinned)
         }
     };
     html! { (words.list()) (last) }

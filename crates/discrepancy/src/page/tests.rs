@@ -6,6 +6,7 @@ use crate::noise::{SensorNoise, Source};
 use crate::report::{Heldout, NamedEffect, RankedEffect, Report, Retuned, Value, Verdict};
 use crate::split::Split;
 use crate::terms::{Coefficient, FoundTerm, LackingForce};
+use crate::thin::Thinned;
 use crate::trial::{Kind, Phase};
 
 fn cell(channel: Kind, phase: Phase, mean_square: f64, p_value: f64) -> Cell {
@@ -124,6 +125,7 @@ fn report(verdict: Verdict) -> Report {
         split: Split { fitted: 28, choosing: 6, reported: 6, shared: false },
         seed: 1,
         fold: None,
+        thinned: Thinned::default(),
         left_out: Vec::new(),
         reason: None,
         model: None,
