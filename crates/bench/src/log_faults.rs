@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use log_check::{Check, Kind, Reading, check};
-use measured_log::{Channel, Log, Readings, Shape};
+use measured_log::{Channel, Format, Log, Notes, Readings, Shape};
 use rayon::prelude::*;
 use serde::Serialize;
 use statistics::wilson95;
@@ -105,13 +105,7 @@ pub struct Table {
 ///
 /// A folder that holds no log, or one of an arm.
 pub fn run(folders: &[PathBuf], commit: String) -> Result<Table> {
-    let read = |folder: &PathBuf| -> Result<(PathBuf, Log)> {
-        let log = measured_log::read(folder)?;
-        let arm = log.header.robot != measured_log::Robot::None;
-        anyhow::ensure!(!arm, "{}: expected a log with robot = \"none\"", folder.display());
-        Ok((folder.clone(), log))
-    };
-    let logs: Vec<(PathBuf, Log)> = folders.iter().map(read).collect::<Result<_>>()?;
+    let logs = read(folders)?;
     let good: Vec<Check> = logs.par_iter().map(|(_, log)| check(log, None)).collect();
     let accused =
         logs.iter().zip(&good).filter(|(_, check)| !check.suspicions.is_empty()).map(|((folder, _), check)| {
@@ -136,6 +130,38 @@ pub fn run(folders: &[PathBuf], commit: String) -> Result<Table> {
         accused: accused.collect(),
         logs: folders.iter().map(|folder| name(folder)).collect(),
     })
+}
+
+fn read(folders: &[PathBuf]) -> Result<Vec<(PathBuf, Log)>> {
+    let one = |folder: &PathBuf| -> Result<(PathBuf, Log)> {
+        let log = measured_log::read(folder)?;
+        let arm = log.header.robot != measured_log::Robot::None;
+        anyhow::ensure!(!arm, "{}: expected a log with robot = \"none\"", folder.display());
+        Ok((folder.clone(), log))
+    };
+    folders.iter().map(one).collect()
+}
+
+/// Writes every log, spoilt in every way that it can be, into `out`: folders named after the log and the fault. How many.
+///
+/// # Errors
+///
+/// As [`run`], and a folder that is there or cannot be written.
+pub fn write(folders: &[PathBuf], out: &Path) -> Result<usize> {
+    let mut count = 0;
+    for (folder, log) in read(folders)? {
+        let name = name(&folder).replace(['/', '\\'], "-");
+        for (fault, spoilt) in faults() {
+            let Some((spoilt, _)) = spoil(&spoilt, &log) else { continue };
+            let words: Vec<&str> =
+                fault.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+            let place = out.join(format!("{name}-{}", words.join("-")));
+            let notes = Notes::from([("", format!("Spoilt: {fault}"))]);
+            measured_log::write(&place, &spoilt, Format::Parquet, &notes)?;
+            count += 1;
+        }
+    }
+    Ok(count)
 }
 
 fn name(folder: &Path) -> String {
@@ -321,6 +347,22 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn spoilt_logs_are_written_under_the_names_of_their_faults() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs/set-003");
+        let count = write(std::slice::from_ref(&log), folder.path()).unwrap();
+        let written: Vec<PathBuf> =
+            std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(count > 20 && written.len() == count, "{count}, {}", written.len());
+        let good = measured_log::read(&log).unwrap();
+        for place in written {
+            assert_ne!(measured_log::read(&place).unwrap(), good, "{}", place.display());
+        }
+        // What is there stays.
+        assert!(write(&[log], folder.path()).is_err());
+    }
 
     #[test]
     fn what_can_be_seen_is_caught_and_good_logs_are_not_accused() {

@@ -135,6 +135,9 @@ enum What {
         /// Folders of good logs with robot = "none".
         #[arg(required = true)]
         logs: Vec<PathBuf>,
+        /// Writes the spoilt logs into this new folder, for `diagnose`, and makes no table.
+        #[arg(long, value_name = "FOLDER", conflicts_with = "json")]
+        write: Option<PathBuf>,
         /// Prints one JSON object.
         #[arg(long)]
         json: bool,
@@ -212,7 +215,11 @@ fn run(arguments: &Arguments) -> Result<()> {
                 program::show(&prior::table(&result));
             }
         }
-        What::LogCheck { logs, json } => {
+        What::LogCheck { logs, write: Some(folder), .. } => {
+            let count = log_faults::write(logs, folder)?;
+            program::say!("{}: {count} logs", folder.display());
+        }
+        What::LogCheck { logs, json, .. } => {
             let table = log_faults::run(logs, scenario::commit(&root))?;
             program::show(&if *json { table.json()? + "\n" } else { table.markdown() });
         }

@@ -97,7 +97,7 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
 }
 
 /// What touches: the ball of the log, or what of the hand can touch.
-fn tool(log: &Log, arm: Option<&Robot>) -> Tool {
+pub(crate) fn tool(log: &Log, arm: Option<&Robot>) -> Tool {
     let Some(arm) = arm else {
         return Tool { balls: log.header.tool_radius_m.map(|radius_m| ([0.0; 3], radius_m)).into_iter().collect() };
     };

@@ -19,6 +19,7 @@
 //! # }
 //! ```
 
+mod align;
 mod arm;
 mod check;
 mod geometry;
@@ -29,6 +30,7 @@ mod shape;
 mod suspicion;
 mod wrench;
 
+pub use align::{Alignment, Estimate, align};
 pub use check::{Check, check};
 pub use geometry::{Fit, Rest, Touch};
 pub use reading::Reading;

@@ -26,6 +26,13 @@ pub enum Reading {
     Mirrored(usize),
     /// An axis of the object's positions points the other way, and its turns do not show it.
     PositionMirrored(usize),
+    /// Object poses are in a frame that lies elsewhere: they are to be turned about the vertical through the origin, then moved.
+    Moved {
+        /// m.
+        translation_m: [f64; 3],
+        /// rad.
+        yaw_rad: f64,
+    },
     /// x and y of the object's positions are exchanged.
     PositionSwapped,
     /// Positions of the object in another unit of length: times this they are metres.
@@ -82,6 +89,13 @@ impl Reading {
             }
             Self::Mirrored(i) => format!("with the {} axis of the object's poses reversed", axis(*i)),
             Self::PositionMirrored(i) => format!("with the sign of object_{}_m reversed", axis(*i)),
+            Self::Moved { translation_m: [x, y, z], yaw_rad } => format!(
+                "with the object's poses turned by {:.2}° about z and moved by ({:.1}, {:.1}, {:.1}) mm",
+                yaw_rad.to_degrees(),
+                1e3 * x,
+                1e3 * y,
+                1e3 * z
+            ),
             Self::PositionSwapped => "with object_x_m and object_y_m exchanged".into(),
             Self::PositionScaled(factor) => format!("with the object's positions times {factor}"),
             Self::LengthsSwapped(a, b) => {
@@ -135,6 +149,10 @@ impl Reading {
                 new(mirror * place, UnitQuaternion::from_rotation_matrix(&turn))
             }
             Self::PositionMirrored(axis) => new(mirror(*axis) * place, turn),
+            Self::Moved { translation_m, yaw_rad } => {
+                let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * *yaw_rad);
+                new(turned * place + Vector3::from(*translation_m), turned * turn)
+            }
             Self::PositionSwapped => new(Vector3::new(place.y, place.x, place.z), turn),
             Self::PositionScaled(factor) => new(place * *factor, turn),
             // From the face to the centre, along the object's own axis that is nearest to the vertical.
@@ -147,6 +165,10 @@ impl Reading {
     fn rates(&self, velocity: Vector3<f64>, spin: Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         match self {
             Self::TrackerTurned(quarters) => (quarter_turns(*quarters) * velocity, quarter_turns(*quarters) * spin),
+            Self::Moved { yaw_rad, .. } => {
+                let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * *yaw_rad);
+                (turned * velocity, turned * spin)
+            }
             // A turn about an axis changes its sense in a mirror.
             Self::Mirrored(axis) => (mirror(*axis) * velocity, -(mirror(*axis) * spin)),
             Self::PositionMirrored(axis) => (mirror(*axis) * velocity, spin),

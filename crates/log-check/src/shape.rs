@@ -73,6 +73,21 @@ impl Solid {
         }
     }
 
+    /// The vertical as it is where the object lies on the face that is nearest to the table, if it almost does.
+    pub(crate) fn resting(&self, vertical: &Vector3<f64>) -> Vector3<f64> {
+        const ALMOST_RAD: f64 = 0.1;
+        if self.tilt_rad(vertical) > ALMOST_RAD {
+            return *vertical;
+        }
+        let axis = vertical.iamax();
+        match self {
+            Self::Sphere(_) => *vertical,
+            // It may lie on any line of its side.
+            Self::Cylinder(..) if axis < 2 => Vector3::new(vertical.x, vertical.y, 0.0).normalize(),
+            _ => Vector3::from_fn(|i, _| if i == axis { vertical[axis].signum() } else { 0.0 }),
+        }
+    }
+
     /// Direction in which the distance grows fastest, object axes.
     pub(crate) fn outward(&self, point: &Vector3<f64>) -> Vector3<f64> {
         const STEP_M: f64 = 1e-6;

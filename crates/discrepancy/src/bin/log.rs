@@ -5,8 +5,9 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use discrepancy::{Error, Nominal, rig_tool, warning};
-use log_check::{Check, Reading, Sensor};
+use log_check::{Alignment, Check, Estimate, Reading, Sensor};
 use measured_log::{Format, Log, Notes};
+use physics_model::rig::RigTool;
 use physics_model::robot::check_root;
 use program::typed;
 
@@ -23,6 +24,26 @@ enum Verb {
     /// Says what is in a log, what looks wrong with units, frames, sizes, clocks and sensors, and what it cannot show.
     #[command(after_help = EXAMPLES)]
     Check(Checked),
+    /// Fits how tool and object lie to each other, from the rows in which one pushes the other: the tracker's frame, the object's size, its clock.
+    #[command(
+        after_help = "Examples:\n  cargo xtask log align tests/data/mujoco-logs/logs/set-003\n  cargo xtask log align runs/my-log --fix runs/my-log-aligned"
+    )]
+    Align(Aligned),
+}
+
+#[derive(Debug, clap::Args)]
+struct Aligned {
+    /// Folder of the log.
+    log: PathBuf,
+    /// Writes a copy in which the object's poses and size are as fitted; the folder must not hold a log yet.
+    #[arg(long, value_name = "DIR")]
+    fix: Option<PathBuf>,
+    /// Prints the values as one JSON object.
+    #[arg(long)]
+    json: bool,
+    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
 }
 
 #[derive(Debug, clap::Args)]
@@ -49,15 +70,18 @@ struct Checked {
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask log check tests/data/mujoco-logs/logs/set-003
-  cargo xtask log check runs/my-log --fix runs/my-log-mended";
+  cargo xtask log check runs/my-log --fix runs/my-log-mended
+  cargo xtask log align runs/my-log";
 
 /// Split of the episodes for what is simulated: that of `diagnose` without `--seed`.
 const SEED: u64 = 1;
 
 fn main() -> ExitCode {
-    let Arguments { verb: Verb::Check(options) } = program::parse();
     let mut denied = false;
-    let done = run(&options).map(|wrong| denied = wrong && options.deny);
+    let done = match program::parse::<Arguments>().verb {
+        Verb::Check(options) => run(&options).map(|wrong| denied = wrong && options.deny),
+        Verb::Align(options) => align(&options),
+    };
     let code = program::end(done, |error| if let Error::Folder { .. } = error { 1 } else { 2 });
     if denied { ExitCode::from(1) } else { code }
 }
@@ -85,6 +109,63 @@ fn run(options: &Checked) -> Result<bool, Error> {
         fix(&log, &check, &options.log, out)?;
     }
     Ok(!check.suspicions.is_empty())
+}
+
+fn align(options: &Aligned) -> Result<(), Error> {
+    if let Some(root) = &options.root {
+        check_root(root)?;
+    }
+    let log = measured_log::read(&options.log)?;
+    let tool = rig_tool(&log, options.root.as_deref())?;
+    let arm = if let RigTool::Arm(arm) = &tool { Some(&**arm) } else { None };
+    let unfit = |reason| Error::Unfit { log: options.log.display().to_string(), reason };
+    let found = log_check::align(&log, arm).map_err(unfit)?;
+    if options.json {
+        let json = serde_json::to_string_pretty(&found).map_err(|error| Error::Model { reason: error.to_string() })?;
+        program::show(&(json + "\n"));
+    } else {
+        print_alignment(&found);
+    }
+    if let Some(out) = &options.fix {
+        let readings = found.readings();
+        let done: Vec<String> = readings.iter().map(Reading::words).collect();
+        copy(&readings.iter().fold(log, |log, reading| reading.apply(&log)), &done, &options.log, out)?;
+    }
+    Ok(())
+}
+
+fn print_alignment(found: &Alignment) {
+    let [before, after] = found.distance_m.map(|distance| 1e3 * distance);
+    program::out!(
+        "The tool pushes the object in {} episodes. Their surfaces are then {before:.2} mm apart in the median; aligned {after:.2} mm.",
+        found.episodes
+    );
+    let [x, y, z] = found.translation_m;
+    let size = Estimate { value: found.size_factor.value - 1.0, ..found.size_factor };
+    let rows = [
+        ("object's poses, x", x, 1e3, "mm"),
+        ("object's poses, y", y, 1e3, "mm"),
+        ("object's poses, z", z, 1e3, "mm"),
+        ("object's poses, about z", found.yaw_rad, 1f64.to_degrees(), "°"),
+        ("object's lengths", size, 100.0, "%"),
+        ("object's clock, late", found.late_secs, 1e3, "ms"),
+    ];
+    for (what, estimate, factor, unit) in rows {
+        let says = if estimate.shows() { "" } else { "  (no more than chance)" };
+        program::out!("  {what:24} {:+8.2} ± {:.2} {unit}{says}", factor * estimate.value, factor * estimate.stddev);
+    }
+    if rows.iter().all(|(_, estimate, ..)| !estimate.shows()) {
+        program::out!("Tool and object lie as the log says.");
+        return;
+    }
+    let [x, y, z] = found.translation_m.map(|estimate| estimate.value);
+    program::out!("In the mapping of `import-log`, where the object has no frame yet:\n");
+    program::out!("[object]\nframe = \"aligned\"\noffset_secs = {:.4}\n", -found.late_secs.value);
+    program::out!(
+        "[frames.aligned]\ntranslation_m = [{x:.5}, {y:.5}, {z:.5}]\nrpy_deg = [0.0, 0.0, {:.3}]\n",
+        found.yaw_rad.value.to_degrees()
+    );
+    program::out!("and the lengths of `log.object` times {:.4}.", found.size_factor.value);
 }
 
 fn print(log: &Log, check: &Check, sentences: &[String]) {
@@ -173,9 +254,14 @@ fn fix(log: &Log, check: &Check, source: &Path, out: &Path) -> Result<(), Error>
         program::say!("nothing of it can be mended here: no copy was written");
         return Ok(());
     }
+    copy(&mended, &done, source, out)
+}
+
+/// Writes a changed copy of a log, and says what was done.
+fn copy(mended: &Log, done: &[String], source: &Path, out: &Path) -> Result<(), Error> {
     let mut notes = Notes::new();
     notes.insert("", format!("A copy of {}, {}.", source.display(), done.join(", ")));
-    measured_log::write(out, &mended, Format::Csv, &notes)?;
+    measured_log::write(out, mended, Format::Csv, &notes)?;
     done.iter().for_each(|words| program::say!("{}: {words}", typed(out)));
     program::next(&[(
         ["cargo", "xtask", "diagnose", "--measured", &typed(out)].map(String::from).to_vec(),
