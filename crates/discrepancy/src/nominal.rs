@@ -345,11 +345,12 @@ impl Nominal {
         (self.tunables.iter().zip(z)).map(|(tunable, z)| if contact(tunable.place) { 0.0 } else { *z }).collect()
     }
 
-    /// A tunable's value in its prior mean; 1 where re-tuning may not change it.
-    fn factor(&self, z: &[f64], place: Place) -> f64 {
+    /// A contact's value in that of the plain engine, of which an engine may be a variant; 1 where re-tuning may not change it. The mean is another one where
+    /// a model file has set it.
+    fn factor(&self, z: &[f64], place: Place, plain: f64) -> f64 {
         let index = self.tunables.iter().position(|tunable| tunable.place == place);
         let value = |index: usize| self.tunables[index].value(z[index].clamp(-CONTACT_RANGE, CONTACT_RANGE));
-        index.map_or(1.0, |index| value(index) / self.tunables[index].mean)
+        index.map_or(1.0, |index| value(index) / plain)
     }
 
     /// The rig with coordinates `z`.
@@ -358,12 +359,15 @@ impl Nominal {
         let header = &self.header;
         let steps = self.steps() * engine.refinement;
         let tool_friction = self.value(z, Place::ToolFriction, self.tool_friction());
+        let plain = self.engine();
+        let frequency = self.factor(z, Place::ContactFrequency, plain.contact_frequency_hz);
+        let damping = self.factor(z, Place::ContactDamping, plain.contact_damping_ratio);
         let world = WorldConfig {
             control_period_secs: header.period_secs / f64::from(steps),
             control_steps: 1,
             solver_iterations: engine.solver_iterations,
-            contact_frequency_hz: self.factor(z, Place::ContactFrequency) * engine.contact_frequency_hz,
-            contact_damping_ratio: self.factor(z, Place::ContactDamping) * engine.contact_damping_ratio,
+            contact_frequency_hz: frequency * engine.contact_frequency_hz,
+            contact_damping_ratio: damping * engine.contact_damping_ratio,
             table_height_m: self.value(z, Place::TableHeight, header.table.height_m),
             gravity_mps2: header.gravity_mps2,
             tool_friction,
@@ -455,5 +459,18 @@ pub(crate) mod tests {
             split: SplitConfig { holdout_fraction: 0.5 },
         };
         Nominal::new(&header, RigTool::None).unwrap()
+    }
+
+    #[test]
+    fn contacts_that_a_model_file_has_set_are_those_that_are_simulated() {
+        let mut nominal = uncertain_mass();
+        let z = vec![0.0; nominal.tunables.len()];
+        let engine = nominal.engine();
+        assert_eq!(nominal.rig(&z, &engine).world.contact_frequency_hz, engine.contact_frequency_hz);
+        let contact = nominal.tunables.iter_mut().find(|tunable| tunable.key == "contact.frequency_hz").unwrap();
+        contact.mean = 120.0;
+        assert!((nominal.rig(&z, &engine).world.contact_frequency_hz - 120.0).abs() < 1e-9);
+        let stiffer = Engine { contact_frequency_hz: 2.0 * engine.contact_frequency_hz, ..engine };
+        assert!((nominal.rig(&z, &stiffer).world.contact_frequency_hz - 240.0).abs() < 1e-9);
     }
 }

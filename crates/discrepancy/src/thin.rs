@@ -27,6 +27,8 @@ const PUSHED_SECS: f64 = 0.005;
 const THROWN_SECS: f64 = 0.002;
 /// Ticks of a log, at most: five times those of 40 pushes at 50 Hz; some two minutes on two cores.
 const MOST_TICKS: usize = 30_000;
+/// Readings further apart say nothing of the slope between them, s.
+const NEIGHBOURS_SECS: f64 = 0.2;
 /// Episodes that are kept whatever they last.
 const LEAST_EPISODES: usize = 40;
 
@@ -96,20 +98,30 @@ fn chosen(log: &Log, seed: u64) -> Vec<usize> {
 /// The log in ticks that are long enough, and how many rows each stands for.
 fn at_rate(log: &Log, has_tool: bool) -> (Cow<'_, Log>, usize) {
     let shortest_secs = if has_tool { PUSHED_SECS } else { THROWN_SECS };
-    let rows = (shortest_secs / log.header.period_secs + 1e-6).floor() as usize;
+    let period_secs = log.header.period_secs;
+    // Rows that come more slowly than the header says are not dense.
+    let rows = (shortest_secs / period_secs.max(usual_step_secs(log)) + 1e-6).floor() as usize;
     if rows < 2 {
         return (Cow::Borrowed(log), 1);
     }
-    let tick_secs = rows as f64 * log.header.period_secs;
+    let tick_secs = (shortest_secs / period_secs + 1e-6).floor() * period_secs;
     let episodes = log.episodes.iter().map(|episode| coarse(episode, tick_secs)).collect();
     let mut coarse = Log { header: log.header.clone(), episodes };
     coarse.header.period_secs = tick_secs;
-    coarse.header.noise = scaled(log, &coarse, rows);
+    coarse.header.noise = scaled(log, &coarse);
     (Cow::Owned(coarse), rows)
 }
 
+/// Median time between rows, s.
+fn usual_step_secs(log: &Log) -> f64 {
+    let steps = log.episodes.iter().flat_map(|episode| episode.time_secs.windows(2).map(|two| two[1] - two[0]));
+    let mut steps: Vec<f64> = steps.collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY)
+}
+
 /// What `log.toml` says of the noise, for means.
-fn scaled(log: &Log, coarse: &Log, rows: usize) -> Noise {
+fn scaled(log: &Log, coarse: &Log) -> Noise {
     let [fine, mean] = [log, coarse].map(|log| {
         let mut log = Cow::Borrowed(log);
         log.to_mut().header.noise = Noise::default();
@@ -119,7 +131,8 @@ fn scaled(log: &Log, coarse: &Log, rows: usize) -> Noise {
         let scatter = |levels: &NoiseLevels| levels.all().find(|noise| noise.channel == kind)?.scatter;
         // Of what does not scatter nothing is known.
         let ratio = scatter(&mean).zip(scatter(&fine)).map_or(1.0, |(mean, fine)| mean / fine);
-        Some(given? * ratio.clamp((rows as f64).sqrt().recip(), 1.0))
+        let white = (new_readings(log, kind) / readings(coarse, kind)).max(1.0).sqrt().recip();
+        Some(given? * ratio.clamp(white, 1.0))
     };
     let noise = &log.header.noise;
     Noise {
@@ -135,27 +148,53 @@ fn scaled(log: &Log, coarse: &Log, rows: usize) -> Noise {
     }
 }
 
+/// Readings of a kind; the first of its columns speaks for all.
+fn readings(log: &Log, kind: Kind) -> f64 {
+    columns(log, kind).map(|cells| cells.count() as f64).sum::<f64>().max(1.0)
+}
+
+/// The same that differ from the one before: what is held is no new reading.
+fn new_readings(log: &Log, kind: Kind) -> f64 {
+    let new = |cells: &Readings| {
+        let read: Vec<f64> = cells.iter().flatten().collect();
+        1 + read.windows(2).filter(|two| two[0] != two[1]).count()
+    };
+    columns(log, kind).map(|cells| new(cells) as f64).sum()
+}
+
+fn columns(log: &Log, kind: Kind) -> impl Iterator<Item = &Readings> {
+    let first = match kind {
+        Kind::ObjectOrientation => Some(Channel::ObjectOrientation(Component::X)),
+        _ => kind.channels(usize::from(log.header.robot.joints())).into_iter().next(),
+    };
+    log.episodes.iter().filter_map(move |episode| episode.channels.get(&first?))
+}
+
 /// Readings of a row of the coarse log: their mean, and the mean of their times.
 type Mean = Option<(f64, f64)>;
 
-/// An episode in ticks of `tick_secs`.
+/// An episode in ticks of `tick_secs`, as far as there are rows about them.
 fn coarse(episode: &Episode, tick_secs: f64) -> Episode {
-    let Some(begin_secs) = episode.time_secs.first().copied() else { return episode.clone() };
-    let tick = |time_secs: f64, offset: f64| ((time_secs - begin_secs) / tick_secs + offset).max(0.0) as usize;
-    // The tick about whose end a row lies, and the one that it lies in.
-    let about: Vec<usize> = episode.time_secs.iter().map(|time| tick(*time, 0.5)).collect();
-    let within: Vec<usize> = episode.time_secs.iter().map(|time| tick(*time, 1.0 - 1e-6)).collect();
-    // A last half tick has no row about its end.
-    let ticks = 1 + episode.time_secs.last().map_or(0, |time| tick(*time, 1e-6));
-    // Mostly gaps: it is no denser than this, and its rows may lie between ticks.
-    if ticks > episode.rows() {
+    let (Some(begin_secs), Some(end_secs)) = (episode.time_secs.first(), episode.time_secs.last()) else {
         return episode.clone();
-    }
-    let secs = |tick: usize| begin_secs + tick as f64 * tick_secs;
-    let means = |readings: &Readings, of: &[usize]| -> Vec<Mean> {
-        let mut sums = vec![(0.0, 0.0, 0_u32); ticks];
-        for ((reading, time), tick) in readings.iter().zip(&episode.time_secs).zip(of) {
-            if let (Some(value), Some(sum)) = (reading, sums.get_mut(*tick)) {
+    };
+    let tick = |time_secs: f64, offset: f64| ((time_secs - begin_secs) / tick_secs + offset).max(0.0) as usize;
+    // A last half tick has no row about its end.
+    let last = tick(*end_secs, 1e-6);
+    // The tick about whose end a row lies.
+    let about: Vec<usize> = episode.time_secs.iter().map(|time| tick(*time, 0.5)).collect();
+    let mut ticks: Vec<usize> = about.iter().copied().filter(|tick| *tick <= last).collect();
+    ticks.dedup();
+    let place = |tick: usize| ticks.binary_search(&tick).ok();
+    let about: Vec<Option<usize>> = about.into_iter().map(place).collect();
+    // And the one that it lies in.
+    let within: Vec<Option<usize>> = episode.time_secs.iter().map(|time| place(tick(*time, 1.0 - 1e-6))).collect();
+    let secs: Vec<f64> = ticks.iter().map(|tick| begin_secs + *tick as f64 * tick_secs).collect();
+    let means = |readings: &Readings, of: &[Option<usize>]| -> Vec<Mean> {
+        let mut sums = vec![(0.0, 0.0, 0_u32); ticks.len()];
+        for ((reading, time), place) in readings.iter().zip(&episode.time_secs).zip(of) {
+            if let (Some(value), Some(place)) = (reading, place) {
+                let sum = &mut sums[*place];
                 *sum = (sum.0 + value, sum.1 + time, sum.2 + 1);
             }
         }
@@ -164,31 +203,28 @@ fn coarse(episode: &Episode, tick_secs: f64) -> Episode {
         };
         sums.into_iter().map(mean).collect()
     };
-    let nearest: Vec<usize> = (0..ticks).map(|tick| nearest_row(&episode.time_secs, secs(tick))).collect();
-    let mut channels = std::collections::BTreeMap::new();
+    let nearest: Vec<usize> = secs.iter().map(|secs| nearest_row(&episode.time_secs, *secs)).collect();
     let turned = continuous(episode);
-    for (channel, readings) in &episode.channels {
-        let cells: Readings = match channel {
+    let cells = |channel: &Channel, readings: &Readings| -> Readings {
+        match channel {
             Channel::WristForce(_) | Channel::WristTorque(_) | Channel::JointTorque(_) => {
                 means(readings, &within).into_iter().map(|mean| mean.map(|(value, _)| value)).collect()
             }
             Channel::Command(_) => {
-                (0..ticks).map(|tick| sent(readings, &episode.time_secs, &about, (tick, secs(tick)))).collect()
+                let read = means(readings, &about);
+                let one = |(mean, secs): (&Mean, &f64)| mean.and_then(|_| sent(readings, &episode.time_secs, *secs));
+                read.iter().zip(&secs).map(one).collect()
             }
             Channel::AddedMass => nearest.iter().map(|row| readings.get(*row)).collect(),
             _ => {
                 let readings = turned.iter().find(|(of, _)| of == channel).map_or(readings, |(_, readings)| readings);
                 moved(&means(readings, &about), &secs).into_iter().collect()
             }
-        };
-        channels.insert(*channel, cells);
-    }
-    let mut coarse = Episode {
-        id: episode.id,
-        time_secs: (0..ticks).map(secs).collect(),
-        action: episode.action.as_ref().map(|action| nearest.iter().map(|row| action[*row]).collect()),
-        channels,
+        }
     };
+    let channels = episode.channels.iter().map(|(channel, readings)| (*channel, cells(channel, readings))).collect();
+    let action = episode.action.as_ref().map(|action| nearest.iter().map(|row| action[*row]).collect());
+    let mut coarse = Episode { id: episode.id, time_secs: secs.clone(), action, channels };
     to_unit_length(&mut coarse);
     coarse
 }
@@ -200,11 +236,8 @@ fn nearest_row(time_secs: &[f64], at_secs: f64) -> usize {
     if at_secs - time_secs[before] < time_secs[next] - at_secs { before } else { next }
 }
 
-/// What was sent at a tick, by linear interpolation; nothing where nothing was sent about it.
-fn sent(readings: &Readings, time_secs: &[f64], about: &[usize], (tick, at_secs): (usize, f64)) -> Option<f64> {
-    let first = about.partition_point(|of| *of < tick);
-    let own = (first..about.len()).take_while(|row| about[*row] == tick);
-    own.clone().find(|row| readings.get(*row).is_some())?;
+/// What was sent at a time, by linear interpolation.
+fn sent(readings: &Readings, time_secs: &[f64], at_secs: f64) -> Option<f64> {
     let next = time_secs.partition_point(|time| *time < at_secs - 1e-9);
     let read = |row: usize| Some((time_secs[row], readings.get(row)?));
     let after = (next..time_secs.len()).find_map(read);
@@ -218,21 +251,18 @@ fn sent(readings: &Readings, time_secs: &[f64], about: &[usize], (tick, at_secs)
     }
 }
 
-/// Means moved to the times of their ticks.
-fn moved(means: &[Mean], secs: &dyn Fn(usize) -> f64) -> Vec<Option<f64>> {
-    let one = |(tick, mean): (usize, &Mean)| {
-        let (value, time) = (*mean)?;
-        let off_secs = secs(tick) - time;
-        let neighbour = |index: Option<usize>| index.and_then(|index| means.get(index).copied().flatten());
-        let before = neighbour(tick.checked_sub(1)).or(*mean);
-        let after = neighbour(tick.checked_add(1)).or(*mean);
-        let slope = before
-            .zip(after)
-            .filter(|((_, t0), (_, t1))| t1 > t0)
-            .map_or(0.0, |((a, t0), (b, t1))| (b - a) / (t1 - t0));
-        Some(value + slope * off_secs)
-    };
-    means.iter().enumerate().map(one).collect()
+/// Means moved to the times of their ticks, along the slope between the means before and after.
+fn moved(means: &[Mean], secs: &[f64]) -> Vec<Option<f64>> {
+    let read: Vec<(usize, (f64, f64))> =
+        means.iter().enumerate().filter_map(|(place, mean)| Some((place, (*mean)?))).collect();
+    let mut moved = vec![None; means.len()];
+    for (index, (place, (value, time))) in read.iter().enumerate() {
+        let (_, (a, t0)) = read[index.saturating_sub(1)];
+        let (_, (b, t1)) = read[(index + 1).min(read.len() - 1)];
+        let slope = if t1 > t0 && t1 - t0 < NEIGHBOURS_SECS { (b - a) / (t1 - t0) } else { 0.0 };
+        moved[*place] = Some(value + slope * (secs[*place] - time));
+    }
+    moved
 }
 
 /// The components of the object's orientation with the sign of each quaternion as of the one before: q and −q are one rotation, whose mean is none.
@@ -384,11 +414,29 @@ mod tests {
     }
 
     #[test]
-    fn an_episode_of_gaps_stays_as_it_is() {
+    fn gaps_and_a_header_that_is_wrong_make_no_rows() {
         let mut log = dense(1, 1, 0.0, |time| time);
-        let episode = &mut log.episodes[0];
-        *episode = episode.part(0..3);
-        episode.time_secs = vec![0.0, 0.001, 80_000.0];
-        assert_eq!(thinned(&log, true, 1).0.episodes, log.episodes);
+        for time in &mut log.episodes[0].time_secs[1000..] {
+            *time += 80_000.0;
+        }
+        let (found, _) = thinned(&log, true, 1);
+        assert!((195..=205).contains(&found.episodes[0].rows()), "{}", found.episodes[0].rows());
+        // Of slow rows whose header says that they are fast nothing is taken together.
+        let mut slow = dense(1, 1, 0.0, |time| time);
+        slow.episodes[0].time_secs.iter_mut().for_each(|time| *time *= 40.0);
+        slow.header.period_secs = 1e-9;
+        assert!(matches!(thinned(&slow, true, 1), (Cow::Borrowed(_), Thinned { rows_per_tick: 1, .. })));
+    }
+
+    #[test]
+    fn readings_of_a_slow_camera_are_moved_to_their_ticks() {
+        let log = dense(1, 41, 0.0, |time| 0.3 * time);
+        let (found, _) = thinned(&log, true, 1);
+        let episode = &found.episodes[0];
+        let read: Vec<(f64, f64)> = (0..episode.rows())
+            .filter_map(|row| Some((episode.time_secs[row], episode.get(Channel::ObjectPosition(Axis::X), row)?)))
+            .collect();
+        assert!(read.len() > 40);
+        assert!(read.iter().all(|(time, place)| (place - 0.3 * time).abs() < 1e-9), "{read:?}");
     }
 }

@@ -104,6 +104,10 @@ impl<'a> Extractor<'a> {
                 Some(moment) => store.seconds(moment) + shift + track.offset_secs,
                 None => return Err(self.wrong(*stamp, "a time as a number", &cell(*stamp))),
             };
+            // An offset moves the first readings of an episode whose clock starts anew into no other one.
+            if !keep_rows && time < store.restarted_secs() {
+                continue;
+            }
             self.picked.clear();
             for source in sources {
                 let value = match source {

@@ -84,6 +84,8 @@ pub(crate) struct Store {
     /// The label and the time of the last row, and what is added to times since the clock started anew.
     last: (f64, f64),
     shift_secs: f64,
+    /// When the clock last started anew, on the clock of the whole.
+    restarted_secs: f64,
 }
 
 /// More was read than is kept.
@@ -105,6 +107,7 @@ impl Store {
             labels: BTreeMap::new(),
             last: (f64::NAN, f64::NEG_INFINITY),
             shift_secs: 0.0,
+            restarted_secs: f64::NEG_INFINITY,
         }
     }
 
@@ -141,9 +144,15 @@ impl Store {
         let (last_label, last_time) = self.last;
         if label.total_cmp(&last_label).is_ne() && time + self.shift_secs <= last_time {
             self.shift_secs = last_time - time + APART_SECS;
+            self.restarted_secs = time + self.shift_secs;
         }
         self.last = (label, time + self.shift_secs);
         self.shift_secs
+    }
+
+    /// When the clock last started anew, s, as shifted; −∞ where it never did.
+    pub(crate) fn restarted_secs(&self) -> f64 {
+        self.restarted_secs
     }
 
     /// A number that stands for a name of an episode: the name itself where it is one, else one beyond all numbers.

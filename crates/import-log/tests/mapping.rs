@@ -55,6 +55,14 @@ fn a_table_keeps_its_rows_and_a_grid_reads_between_them() {
 }
 
 #[test]
+fn an_early_clock_makes_no_reading_one_of_the_episode_before() {
+    let head = format!("{HEAD}\ngrid = {{ sample = \"linear\", near_secs = 0.2 }}");
+    let log = imported(&head, &format!("{OBJECT}offset_secs = -0.05\n"), TABLE).unwrap();
+    let lasts_secs: Vec<f64> = log.episodes.iter().filter_map(|episode| episode.time_secs.last().copied()).collect();
+    assert!(lasts_secs.len() == 2 && lasts_secs.iter().all(|secs| *secs < 0.3), "{lasts_secs:?}");
+}
+
+#[test]
 fn frames_mounts_and_signs_take_a_reading_to_where_a_log_has_it() {
     // The body's marker is 0.1 m ahead of its centre; the tracker is turned by a quarter about z and 1 m up.
     let tail = "[object]\nposition = [\"x\", 0, 0]\nrpy = [0, 0, \"yaw\"]\nangle_unit = \"deg\"\nframe = \"tracker\"\n\

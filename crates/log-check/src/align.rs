@@ -78,19 +78,29 @@ pub struct Alignment {
     pub late_secs: Estimate,
     /// Episodes with contact.
     pub episodes: usize,
-    /// Median distance between the surfaces of tool and object where they touch, as the log has it and as aligned, m.
+    /// Median distance between the surfaces of tool and object where they touch, as the log has it and as corrected, m.
     pub distance_m: [f64; 2],
+    /// What to do: what does not show is left as it is, and the rest fitted without it.
+    pub correction: Correction,
 }
 
-impl Alignment {
+/// What brings object and tool together; `None`: nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Correction {
+    /// The object's poses are turned about the vertical through the origin, rad, then moved, m.
+    pub frame: Option<([f64; 3], f64)>,
+    /// The object's lengths times this.
+    pub size_factor: Option<f64>,
+    /// The object's readings are late by this, s.
+    pub late_secs: Option<f64>,
+}
+
+impl Correction {
     /// What a log has to be read as, without its clock.
     #[must_use]
-    pub fn readings(&self) -> [Reading; 2] {
-        let value = |estimate: &Estimate| estimate.value;
-        [
-            Reading::Moved { translation_m: self.translation_m.each_ref().map(value), yaw_rad: self.yaw_rad.value },
-            Reading::LengthsScaled(self.size_factor.value),
-        ]
+    pub fn readings(&self) -> Vec<Reading> {
+        let moved = self.frame.map(|(translation_m, yaw_rad)| Reading::Moved { translation_m, yaw_rad });
+        moved.into_iter().chain(self.size_factor.map(Reading::LengthsScaled)).collect()
     }
 }
 
@@ -124,7 +134,7 @@ pub fn align(log: &Log, arm: Option<&Robot>) -> Result<Alignment, String> {
     let scale_m = FLOOR_M.max(2.0 * motions.position_m);
 
     let every: Vec<&Rows> = rows.iter().collect();
-    let (found, spread) = task.solve(&every, &rests, scale_m);
+    let (found, spread) = task.solve(&every, &rests, scale_m, [true; COUNT]);
     if !is_believed(&found) {
         return Err("tool and object do not meet within the misfits of a measured rig: `log check` looks for wrong units, axes and sizes".into());
     }
@@ -132,17 +142,31 @@ pub fn align(log: &Log, arm: Option<&Robot>) -> Result<Alignment, String> {
     let without = |group: usize| {
         let kept: Vec<&Rows> =
             rows.iter().enumerate().filter(|(i, _)| i % groups != group).map(|(_, rows)| rows).collect();
-        task.at_origin(&task.solve(&kept, &rests, scale_m).0)
+        task.solve(&kept, &rests, scale_m, [true; COUNT]).0
     };
     let left: Vec<SVector<f64, COUNT>> = (0..groups).map(without).collect();
-    let value = task.at_origin(&found);
-    let variance = |i: usize| {
-        let mean = left.iter().map(|x| x[i]).sum::<f64>() / groups as f64;
-        let jackknife = (groups - 1) as f64 / groups as f64 * left.iter().map(|x| (x[i] - mean).powi(2)).sum::<f64>();
-        jackknife.max(spread[(i, i)])
+    let estimates = |at: &dyn Fn(&SVector<f64, COUNT>) -> SVector<f64, COUNT>| -> [Estimate; COUNT] {
+        let (value, left): (_, Vec<_>) = (at(&found), left.iter().map(at).collect());
+        std::array::from_fn(|i| {
+            let mean = left.iter().map(|x| x[i]).sum::<f64>() / groups as f64;
+            let squares = left.iter().map(|x| (x[i] - mean).powi(2)).sum::<f64>();
+            let jackknife = (groups - 1) as f64 / groups as f64 * squares;
+            Estimate { value: value[i], stddev: jackknife.max(spread[(i, i)]).sqrt() }
+        })
     };
-    let estimate = |i: usize| Estimate { value: value[i], stddev: variance(i).sqrt() };
-    let factor = value[4].exp();
+    // About the middle an offset does not hide behind a turn.
+    let shows = estimates(&|x| *x).map(|estimate| estimate.shows());
+    let frame = shows[..4].iter().any(|shows| *shows);
+    let free = [frame, frame, frame, frame, shows[4], shows[5]];
+    let (kept, _) = task.solve(&every, &rests, scale_m, free);
+    let corrected = task.at_origin(&kept);
+    let correction = Correction {
+        frame: frame.then(|| ([0, 1, 2].map(|i| corrected[i]), corrected[3])),
+        size_factor: free[4].then(|| corrected[4].exp()),
+        late_secs: free[5].then_some(corrected[5]),
+    };
+    let [x, y, z, yaw, size, late] = estimates(&|x| task.at_origin(x));
+    let factor = size.value.exp();
     let distances = |x: &SVector<f64, COUNT>| {
         let mut all: Vec<f64> = rows
             .iter()
@@ -153,12 +177,13 @@ pub fn align(log: &Log, arm: Option<&Robot>) -> Result<Alignment, String> {
         all.get(all.len() / 2).copied().unwrap_or(0.0)
     };
     Ok(Alignment {
-        translation_m: [0, 1, 2].map(estimate),
-        yaw_rad: estimate(3),
-        size_factor: Estimate { value: factor, stddev: factor * variance(4).sqrt() },
-        late_secs: estimate(5),
+        translation_m: [x, y, z],
+        yaw_rad: yaw,
+        size_factor: Estimate { value: factor, stddev: factor * size.stddev },
+        late_secs: late,
         episodes: rows.len(),
-        distance_m: [distances(&SVector::zeros()), distances(&found)],
+        distance_m: [distances(&SVector::zeros()), distances(&kept)],
+        correction,
     })
 }
 
@@ -269,25 +294,39 @@ impl Task<'_> {
         moved
     }
 
-    /// Coordinates that explain rows best, and their covariance if rows err alone.
-    fn solve(&self, rows: &[&Rows], rests: &[Seen], scale_m: f64) -> (SVector<f64, COUNT>, SMatrix<f64, COUNT, COUNT>) {
+    /// Coordinates that explain rows best, those that are not free being 0, and their covariance if rows err alone.
+    fn solve(
+        &self,
+        rows: &[&Rows],
+        rests: &[Seen],
+        scale_m: f64,
+        free: [bool; COUNT],
+    ) -> (SVector<f64, COUNT>, SMatrix<f64, COUNT, COUNT>) {
         let here = SVector::<f64, COUNT>::zeros();
         // Step by step from a coarse scale, and at once: the former leaps over minima, the latter stays where much is no contact.
         let mut far = here;
         for coarser in COARSER {
-            far = self.descend(far, rows, rests, coarser * scale_m, Ahead::Doubtful).x;
+            far = self.descend(far, rows, rests, coarser * scale_m, Ahead::Doubtful, free).x;
         }
-        let near = self.descend(here, rows, rests, scale_m, Ahead::Doubtful);
-        let far = self.descend(far, rows, rests, scale_m, Ahead::Doubtful);
+        let near = self.descend(here, rows, rests, scale_m, Ahead::Doubtful, free);
+        let far = self.descend(far, rows, rests, scale_m, Ahead::Doubtful, free);
         // A misfit of decimetres can bring any rows together.
         let first = (is_believed(&near.x), -near.loss) > (is_believed(&far.x), -far.loss);
         let best = if first { near } else { far };
-        let last = self.descend(best.x, rows, rests, scale_m, Ahead::NoContact);
+        let last = self.descend(best.x, rows, rests, scale_m, Ahead::NoContact, free);
         (last.x, last.covariance)
     }
 
     /// The same from coordinates on, at a scale of the loss.
-    fn descend(&self, mut x: SVector<f64, COUNT>, rows: &[&Rows], rests: &[Seen], scale_m: f64, ahead: Ahead) -> Found {
+    fn descend(
+        &self,
+        mut x: SVector<f64, COUNT>,
+        rows: &[&Rows],
+        rests: &[Seen],
+        scale_m: f64,
+        ahead: Ahead,
+        free: [bool; COUNT],
+    ) -> Found {
         let residuals = |x: &SVector<f64, COUNT>| -> Vec<f64> {
             let touching = rows.iter().flat_map(|rows| &rows.touching);
             let distances = touching.map(|row| self.distance_m(x, row).unwrap_or(0.0) / scale_m);
@@ -312,6 +351,10 @@ impl Task<'_> {
         let mut precision = SMatrix::<f64, COUNT, COUNT>::identity();
         for _ in 0..ITERATIONS {
             let slopes: [Vec<f64>; COUNT] = std::array::from_fn(|i| {
+                // One that is not free changes nothing, and its prior keeps it at 0.
+                if !free[i] {
+                    return vec![0.0; now.len()];
+                }
                 let [up, down] = [STEP[i], -STEP[i]].map(|step| {
                     let mut other = x;
                     other[i] += step;
@@ -371,6 +414,7 @@ mod tests {
     #[test]
     fn a_log_that_fits_is_left_as_it_is() {
         let found = align(&recorded("set-003"), None).unwrap();
+        assert_eq!(found.correction, Correction::default(), "{found:?}");
         for (value, nothing) in values(&found).iter().zip([0.0, 0.0, 0.0, 0.0, 1.0, 0.0]) {
             assert!((value.value - nothing).abs() < 3.0 * value.stddev, "{found:?}");
         }
@@ -403,7 +447,7 @@ mod tests {
         }
         assert!(found.distance_m[0] > 5.0 * found.distance_m[1], "{found:?}");
         // Read as fitted it fits.
-        let mended = found.readings().iter().fold(log, |log, reading| reading.apply(&log));
+        let mended = found.correction.readings().iter().fold(log, |log, reading| reading.apply(&log));
         let [x, y, ..] = values(&align(&mended, None).unwrap());
         assert!(x.value.abs() < 1e-3 && y.value.abs() < 1e-3, "{x:?} {y:?}");
     }

@@ -30,7 +30,7 @@ mod shape;
 mod suspicion;
 mod wrench;
 
-pub use align::{Alignment, Estimate, align};
+pub use align::{Alignment, Correction, Estimate, align};
 pub use check::{Check, check};
 pub use geometry::{Fit, Rest, Touch};
 pub use reading::Reading;

@@ -50,7 +50,7 @@ pub(crate) struct Motions {
 impl Motions {
     /// Of a log whose object is `size_m` wide. `tool` gives the tool centre of a row.
     pub(crate) fn new(log: &Log, size_m: f64, tool: impl Fn(&Episode, usize) -> Option<[f64; 3]>) -> Self {
-        let turns = log.has(Channel::ObjectOrientation(measured_log::Component::W));
+        let turns = has_turns(log);
         let all: Vec<(u64, Vec<Seen>)> =
             log.episodes.iter().map(|episode| (episode.id, seen(episode, turns, &tool))).collect();
         let steps = |size: fn(&Seen, &Seen) -> f64| {
@@ -86,6 +86,20 @@ impl Motions {
             Shape::Box { .. } | Shape::Prism { .. } => false,
         }
     }
+}
+
+/// Whether turns of the object were read: of a ball, whose turns say nothing of where it is, in most rows.
+fn has_turns(log: &Log) -> bool {
+    let count = |channel: Channel| -> usize {
+        log.episodes
+            .iter()
+            .filter_map(|episode| episode.channels.get(&channel))
+            .map(measured_log::Readings::count)
+            .sum()
+    };
+    let turned = count(Channel::ObjectOrientation(measured_log::Component::W));
+    let ball = matches!(log.header.object.shape, Shape::Sphere { .. });
+    if ball { 2 * turned > count(Channel::ObjectPosition(Axis::X)) } else { turned > 0 }
 }
 
 /// Standard deviation of a component of readings of which these are the steps' lengths: the lower quartile, which motion leaves alone.

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use discrepancy::{Error, Nominal, rig_tool, warning};
-use log_check::{Alignment, Check, Estimate, Reading, Sensor};
+use log_check::{Alignment, Check, Correction, Estimate, Reading, Sensor};
 use measured_log::{Format, Log, Notes};
 use physics_model::rig::RigTool;
 use physics_model::robot::check_root;
@@ -127,7 +127,11 @@ fn align(options: &Aligned) -> Result<(), Error> {
         print_alignment(&found);
     }
     if let Some(out) = &options.fix {
-        let readings = found.readings();
+        let readings = found.correction.readings();
+        if readings.is_empty() {
+            program::say!("nothing of it is to be moved or scaled: no copy was written");
+            return Ok(());
+        }
         let done: Vec<String> = readings.iter().map(Reading::words).collect();
         copy(&readings.iter().fold(log, |log, reading| reading.apply(&log)), &done, &options.log, out)?;
     }
@@ -154,18 +158,36 @@ fn print_alignment(found: &Alignment) {
         let says = if estimate.shows() { "" } else { "  (no more than chance)" };
         program::out!("  {what:24} {:+8.2} ± {:.2} {unit}{says}", factor * estimate.value, factor * estimate.stddev);
     }
-    if rows.iter().all(|(_, estimate, ..)| !estimate.shows()) {
+    if found.correction == Correction::default() {
         program::out!("Tool and object lie as the log says.");
         return;
     }
-    let [x, y, z] = found.translation_m.map(|estimate| estimate.value);
-    program::out!("In the mapping of `import-log`, where the object has no frame yet:\n");
-    program::out!("[object]\nframe = \"aligned\"\noffset_secs = {:.4}\n", -found.late_secs.value);
-    program::out!(
-        "[frames.aligned]\ntranslation_m = [{x:.5}, {y:.5}, {z:.5}]\nrpy_deg = [0.0, 0.0, {:.3}]\n",
-        found.yaw_rad.value.to_degrees()
-    );
-    program::out!("and the lengths of `log.object` times {:.4}.", found.size_factor.value);
+    print_mapping(&found.correction);
+}
+
+/// The lines of a mapping that correct it.
+fn print_mapping(correction: &Correction) {
+    let Correction { frame, size_factor, late_secs } = correction;
+    if frame.is_some() || late_secs.is_some() {
+        program::out!("In the mapping of `import-log`, where the object has no frame and no offset yet:\n");
+        program::out!("[object]");
+    }
+    if frame.is_some() {
+        program::out!("frame = \"aligned\"");
+    }
+    if let Some(late_secs) = late_secs {
+        program::out!("offset_secs = {:.4}  # needs grid.sample = \"linear\"", -late_secs);
+    }
+    if let Some(([x, y, z], yaw_rad)) = frame {
+        program::out!(
+            "\n[frames.aligned]\ntranslation_m = [{x:.5}, {y:.5}, {z:.5}]\nrpy_deg = [0.0, 0.0, {:.3}]",
+            yaw_rad.to_degrees()
+        );
+        program::out!("\nThe same frame is that of [object_velocity] and [object_spin], where the mapping has them.");
+    }
+    if let Some(factor) = size_factor {
+        program::out!("The lengths of `log.object` are to be multiplied by {factor:.4}.");
+    }
 }
 
 fn print(log: &Log, check: &Check, sentences: &[String]) {

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::RobotError;
@@ -106,7 +107,7 @@ pub(super) struct Limit {
     pub(super) lower: f64,
     pub(super) upper: f64,
     pub(super) effort: f64,
-    /// Infinite where the file does not say: many do not, and nothing here uses it.
+    /// Like the effort infinite where the file does not say: many do not, and nothing here uses them.
     pub(super) velocity: f64,
 }
 
@@ -114,7 +115,13 @@ pub(super) struct Limit {
 pub(super) fn read(path: &Path, text: &str) -> Result<Urdf, RobotError> {
     let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| {
-        let reason = whole_file::one_line(&whole_file::plain(&error.to_string()), 300);
+        let reason = match error {
+            roxmltree::Error::DtdDetected => "expected no <!DOCTYPE …>: take it out".into(),
+            error => whole_file::one_line(
+                &format!("expected well-formed XML: {}", whole_file::plain(&error.to_string())),
+                300,
+            ),
+        };
         RobotError::Parse { path: path.into(), reason }
     })?;
     let root = document.root_element();
@@ -131,8 +138,13 @@ fn children<'a>(node: &Node<'a, 'a>, name: &'a str) -> impl Iterator<Item = Node
     node.children().filter(move |child| child.is_element() && child.tag_name().name() == name)
 }
 
-fn child<'a>(node: &Node<'a, 'a>, name: &'a str) -> Option<Node<'a, 'a>> {
-    children(node, name).next()
+/// The only child of a name; two would contradict each other.
+fn child<'a>(node: &Node<'a, 'a>, name: &'a str) -> Result<Option<Node<'a, 'a>>, String> {
+    let mut all = children(node, name);
+    match (all.next(), all.next()) {
+        (found, None) => Ok(found),
+        _ => Err(format!("<{}> has two <{name}>, expected one", node.tag_name().name())),
+    }
 }
 
 fn text(node: &Node, key: &str) -> Result<String, String> {
@@ -155,12 +167,22 @@ fn three(node: &Node, key: &str, default: [f64; 3]) -> Result<[f64; 3], String> 
 }
 
 fn origin(node: &Node) -> Result<Origin, String> {
-    let Some(origin) = child(node, "origin") else { return Ok(Origin::default()) };
-    Ok(Origin { xyz: three(&origin, "xyz", [0.0; 3])?, rpy: three(&origin, "rpy", [0.0; 3])? })
+    let Some(origin) = child(node, "origin")? else { return Ok(Origin::default()) };
+    let xyz = three(&origin, "xyz", [0.0; 3])?;
+    // Of version 1.1 on.
+    let Some(quaternion) = origin.attribute("quat_xyzw") else {
+        return Ok(Origin { xyz, rpy: three(&origin, "rpy", [0.0; 3])? });
+    };
+    let numbers: Result<Vec<f64>, _> = quaternion.split_whitespace().map(str::parse).collect();
+    let four = numbers.ok().and_then(|numbers| <[f64; 4]>::try_from(numbers).ok());
+    let turn = four.and_then(|[x, y, z, w]| UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6));
+    let turn = turn.ok_or_else(|| format!("<origin quat_xyzw={quaternion:?}>: expected a quaternion"))?;
+    let (roll, pitch, yaw) = turn.euler_angles();
+    Ok(Origin { xyz, rpy: [roll, pitch, yaw] })
 }
 
 fn link(node: &Node) -> Result<Link, String> {
-    let inertial = child(node, "inertial").map(|inertial| self::inertial(&inertial)).transpose()?;
+    let inertial = child(node, "inertial")?.map(|inertial| self::inertial(&inertial)).transpose()?;
     let collisions = children(node, "collision").map(|collision| Ok((origin(&collision)?, geometry(&collision)?)));
     Ok(Link {
         name: text(node, "name")?,
@@ -170,7 +192,7 @@ fn link(node: &Node) -> Result<Link, String> {
 }
 
 fn inertial(node: &Node) -> Result<Inertial, String> {
-    let part = |name| child(node, name).ok_or_else(|| format!("<inertial> has no <{name}>"));
+    let part = |name| child(node, name)?.ok_or_else(|| format!("<inertial> has no <{name}>, expected one"));
     let (mass, inertia) = (part("mass")?, part("inertia")?);
     let mut values = [0.0; 6];
     for (value, key) in values.iter_mut().zip(["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]) {
@@ -180,7 +202,7 @@ fn inertial(node: &Node) -> Result<Inertial, String> {
 }
 
 fn geometry(collision: &Node) -> Result<Geometry, String> {
-    let shape = child(collision, "geometry").and_then(|node| node.children().find(Node::is_element));
+    let shape = child(collision, "geometry")?.and_then(|node| node.children().find(Node::is_element));
     let Some(shape) = shape else { return Err("<collision> has no <geometry> with a shape".into()) };
     let [radius, length] = ["radius", "length"].map(|key| number(&shape, key));
     Ok(match shape.tag_name().name() {
@@ -193,7 +215,7 @@ fn geometry(collision: &Node) -> Result<Geometry, String> {
 
 fn joint(node: &Node) -> Result<Joint, String> {
     let end = |name| {
-        let end = child(node, name).ok_or_else(|| format!("<{name}> is missing, expected <{name} link=\"…\"/>"))?;
+        let end = child(node, name)?.ok_or_else(|| format!("<{name}> is missing, expected <{name} link=\"…\"/>"))?;
         text(&end, "link")
     };
     let kind = text(node, "type")?;
@@ -202,8 +224,8 @@ fn joint(node: &Node) -> Result<Joint, String> {
         let names: Vec<&str> = JointKind::ALL.iter().map(|(name, _)| *name).collect();
         format!("is of type {kind:?}, expected one of {}", names.join(", "))
     })?;
-    let axis = child(node, "axis").map_or(Ok([1.0, 0.0, 0.0]), |axis| three(&axis, "xyz", [1.0, 0.0, 0.0]))?;
-    let limit = child(node, "limit").map(|limit| self::limit(&limit)).transpose()?;
+    let axis = child(node, "axis")?.map_or(Ok([1.0, 0.0, 0.0]), |axis| three(&axis, "xyz", [1.0, 0.0, 0.0]))?;
+    let limit = child(node, "limit")?.map(|limit| self::limit(&limit)).transpose()?;
     Ok(Joint {
         name: text(node, "name")?,
         kind,
@@ -216,11 +238,14 @@ fn joint(node: &Node) -> Result<Joint, String> {
 }
 
 fn limit(node: &Node) -> Result<Limit, String> {
+    // Version 1.2 has no limit where none is given, earlier ones have 0.
+    let version = node.document().root_element().attribute("version").and_then(|text| text.trim().parse().ok());
+    let free = if version.unwrap_or(1.0_f64) > 1.15 { f64::INFINITY } else { 0.0 };
     let or = |key, value: f64| if node.has_attribute(key) { number(node, key) } else { Ok(value) };
     Ok(Limit {
-        lower: or("lower", 0.0)?,
-        upper: or("upper", 0.0)?,
-        effort: number(node, "effort")?,
+        lower: or("lower", -free)?,
+        upper: or("upper", free)?,
+        effort: or("effort", f64::INFINITY)?,
         velocity: or("velocity", f64::INFINITY)?,
     })
 }
