@@ -11,13 +11,18 @@ const SHARES: [f64; 2] = [0.001, 0.1];
 /// Period of the ticks, s: the median time between rows, or its part where there are several ticks between two.
 pub(crate) fn period_secs(log: &Log) -> f64 {
     let stated_secs = log.header.period_secs;
-    let mut steps: Vec<f64> =
-        log.episodes.iter().flat_map(|episode| episode.time_secs.windows(2).map(|two| two[1] - two[0])).collect();
-    steps.sort_by(f64::total_cmp);
-    let Some(median_secs) = steps.get(steps.len() / 2) else { return stated_secs };
+    let Some(median_secs) = usual_step_secs(log) else { return stated_secs };
     let found_secs = median_secs / (median_secs / stated_secs).round().max(1.0);
     let off = (found_secs / stated_secs - 1.0).abs();
     if (SHARES[0]..SHARES[1]).contains(&off) { found_secs } else { stated_secs }
+}
+
+/// Median time between rows, s; `None` without two rows in an episode.
+pub(crate) fn usual_step_secs(log: &Log) -> Option<f64> {
+    let steps = log.episodes.iter().flat_map(|episode| episode.time_secs.windows(2).map(|two| two[1] - two[0]));
+    let mut steps: Vec<f64> = steps.collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied()
 }
 
 #[cfg(test)]

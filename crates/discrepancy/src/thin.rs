@@ -19,6 +19,7 @@ use measured_log::{Channel, Component, Episode, Log, Noise, Readings};
 use serde::Serialize;
 
 use crate::noise::NoiseLevels;
+use crate::stamps::usual_step_secs;
 use crate::trial::Kind;
 
 /// Ticks of what is pushed, s, at least: a push at 0.3 m/s goes 1.5 mm in one.
@@ -100,7 +101,7 @@ fn at_rate(log: &Log, has_tool: bool) -> (Cow<'_, Log>, usize) {
     let shortest_secs = if has_tool { PUSHED_SECS } else { THROWN_SECS };
     let period_secs = log.header.period_secs;
     // Rows that come more slowly than the header says are not dense.
-    let rows = (shortest_secs / period_secs.max(usual_step_secs(log)) + 1e-6).floor() as usize;
+    let rows = (shortest_secs / period_secs.max(usual_step_secs(log).unwrap_or(f64::INFINITY)) + 1e-6).floor() as usize;
     if rows < 2 {
         return (Cow::Borrowed(log), 1);
     }
@@ -110,14 +111,6 @@ fn at_rate(log: &Log, has_tool: bool) -> (Cow<'_, Log>, usize) {
     coarse.header.period_secs = tick_secs;
     coarse.header.noise = scaled(log, &coarse);
     (Cow::Owned(coarse), rows)
-}
-
-/// Median time between rows, s.
-fn usual_step_secs(log: &Log) -> f64 {
-    let steps = log.episodes.iter().flat_map(|episode| episode.time_secs.windows(2).map(|two| two[1] - two[0]));
-    let mut steps: Vec<f64> = steps.collect();
-    steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// What `log.toml` says of the noise, for means.

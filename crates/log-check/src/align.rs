@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::arm::tool_m;
 use crate::check::tool;
-use crate::geometry::Tool;
+use crate::geometry::{Tool, between_m, median};
 use crate::motion::{Motion, Motions, Seen};
 use crate::reading::Reading;
 use crate::shape::Solid;
@@ -127,7 +127,7 @@ pub fn align(log: &Log, arm: Option<&Robot>) -> Result<Alignment, String> {
         .collect();
     // Turns are about the middle of what was seen, where they do not look like offsets.
     let all: Vec<Vector3<f64>> =
-        rows.iter().flat_map(|rows| &rows.touching).map(|seen| seen.0.pose.translation.vector).collect();
+        rows.iter().flat_map(|rows| &rows.touching).map(|row| row.seen.pose.translation.vector).collect();
     let centre = all.iter().sum::<Vector3<f64>>() / all.len() as f64;
     let tool = tool(log, arm);
     let task = Task { shape, tool: &tool, centre, table_m: log.header.table.height_m.mean(), turns: motions.turns };
@@ -168,13 +168,8 @@ pub fn align(log: &Log, arm: Option<&Robot>) -> Result<Alignment, String> {
     let [x, y, z, yaw, size, late] = estimates(&|x| task.at_origin(x));
     let factor = size.value.exp();
     let distances = |x: &SVector<f64, COUNT>| {
-        let mut all: Vec<f64> = rows
-            .iter()
-            .flat_map(|rows| rows.touching.iter().filter_map(|row| task.distance_m(x, row)))
-            .map(f64::abs)
-            .collect();
-        all.sort_by(f64::total_cmp);
-        all.get(all.len() / 2).copied().unwrap_or(0.0)
+        let touching = rows.iter().flat_map(|rows| &rows.touching);
+        median(touching.map(|row| task.distance_m(x, row).abs()).collect()).unwrap_or(0.0)
     };
     Ok(Alignment {
         translation_m: [x, y, z],
@@ -192,8 +187,12 @@ fn is_believed(x: &SVector<f64, COUNT>) -> bool {
     (0..COUNT).all(|i| x[i].abs() <= BELIEVED * PRIOR[i])
 }
 
-/// A row with the way of the tool about it: two places with their times.
-type Row = (Seen, [(f64, Vector3<f64>); 3]);
+/// A row in which the object is pushed.
+struct Row {
+    seen: Seen,
+    tool_m: Vector3<f64>,
+    tool_mps: Vector3<f64>,
+}
 
 /// Rows of an episode in which the object is pushed.
 struct Rows {
@@ -218,10 +217,12 @@ impl Rows {
             if !(before.secs < here.secs && here.secs < after.secs) {
                 continue;
             }
-            let (tool, object) = (c - a, after.pose.translation.vector - before.pose.translation.vector);
-            let fast = tool.norm() > STANDS_MPS * (after.secs - before.secs);
-            if fast && tool.dot(&object) > 0.0 && (PUSHED[0]..PUSHED[1]).contains(&(object.norm() / tool.norm())) {
-                touching.push((*here, [(before.secs, a), (here.secs, b), (after.secs, c)]));
+            let secs = after.secs - before.secs;
+            let tool_mps = (c - a) / secs;
+            let object_mps = (after.pose.translation.vector - before.pose.translation.vector) / secs;
+            let along = tool_mps.norm() > STANDS_MPS && tool_mps.dot(&object_mps) > 0.0;
+            if along && (PUSHED[0]..PUSHED[1]).contains(&(object_mps.norm() / tool_mps.norm())) {
+                touching.push(Row { seen: *here, tool_m: b, tool_mps });
             }
         }
         let step = touching.len().div_ceil(ROWS).max(1);
@@ -266,14 +267,9 @@ impl Task<'_> {
     }
 
     /// Signed distance of the surfaces, m; the tool is where it was when the object was where it was read.
-    fn distance_m(&self, x: &SVector<f64, COUNT>, (seen, way): &Row) -> Option<f64> {
-        let (solid, pose) = self.posed(x, seen);
-        let velocity = (way[2].1 - way[0].1) / (way[2].0 - way[0].0);
-        let at = way[1].1 - velocity * x[5];
-        let own = |(centre, radius_m): &([f64; 3], f64)| {
-            solid.distance_m(&pose.inverse_transform_point(&(at + Vector3::from(*centre)).into()).coords) - radius_m
-        };
-        self.tool.balls.iter().map(own).min_by(f64::total_cmp)
+    fn distance_m(&self, x: &SVector<f64, COUNT>, row: &Row) -> f64 {
+        let (solid, pose) = self.posed(x, &row.seen);
+        between_m(&solid, &pose, self.tool, row.tool_m - row.tool_mps * x[5])
     }
 
     /// Height of the lowest point above the table, m.
@@ -304,12 +300,11 @@ impl Task<'_> {
     ) -> (SVector<f64, COUNT>, SMatrix<f64, COUNT, COUNT>) {
         let here = SVector::<f64, COUNT>::zeros();
         // Step by step from a coarse scale, and at once: the former leaps over minima, the latter stays where much is no contact.
-        let mut far = here;
-        for coarser in COARSER {
-            far = self.descend(far, rows, rests, coarser * scale_m, Ahead::Doubtful, free).x;
-        }
         let near = self.descend(here, rows, rests, scale_m, Ahead::Doubtful, free);
-        let far = self.descend(far, rows, rests, scale_m, Ahead::Doubtful, free);
+        let mut far = self.descend(here, rows, rests, COARSER[0] * scale_m, Ahead::Doubtful, free);
+        for coarser in &COARSER[1..] {
+            far = self.descend(far.x, rows, rests, coarser * scale_m, Ahead::Doubtful, free);
+        }
         // A misfit of decimetres can bring any rows together.
         let first = (is_believed(&near.x), -near.loss) > (is_believed(&far.x), -far.loss);
         let best = if first { near } else { far };
@@ -329,7 +324,7 @@ impl Task<'_> {
     ) -> Found {
         let residuals = |x: &SVector<f64, COUNT>| -> Vec<f64> {
             let touching = rows.iter().flat_map(|rows| &rows.touching);
-            let distances = touching.map(|row| self.distance_m(x, row).unwrap_or(0.0) / scale_m);
+            let distances = touching.map(|row| self.distance_m(x, row) / scale_m);
             distances.chain(rests.iter().map(|seen| self.height_m(x, seen) / scale_m)).collect()
         };
         let touching: usize = rows.iter().map(|rows| rows.touching.len()).sum();

@@ -70,7 +70,11 @@ impl Fit {
 
 /// Signed distance of the tool from the object at a row under a reading, m.
 pub(crate) fn distance_m(reading: Option<&Reading>, solid: &Solid, tool: &Tool, seen: &Seen, at: Vector3<f64>) -> f64 {
-    let pose = posed(reading, solid, &seen.pose);
+    between_m(solid, &posed(reading, solid, &seen.pose), tool, at)
+}
+
+/// Signed distance of the tool at a place from the object in a pose, m; infinite without a tool.
+pub(crate) fn between_m(solid: &Solid, pose: &Isometry3<f64>, tool: &Tool, at: Vector3<f64>) -> f64 {
     let own = |(centre, radius_m): &([f64; 3], f64)| {
         solid.distance_m(&pose.inverse_transform_point(&(at + Vector3::from(*centre)).into()).coords) - radius_m
     };
@@ -115,7 +119,7 @@ fn mean(of: &[f64]) -> f64 {
     of.iter().sum::<f64>() / of.len() as f64
 }
 
-fn median(mut of: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(mut of: Vec<f64>) -> Option<f64> {
     of.sort_by(f64::total_cmp);
     of.get(of.len() / 2).copied()
 }
