@@ -6,7 +6,8 @@
 //!
 //! The estimate is the maximum a posteriori under wide normal priors about "nothing is off", by Gauss–Newton steps on the reweighted residuals. Its standard deviations
 //! are those of a jackknife over groups of episodes, as rows of an episode err alike, and no smaller than what rows that err alone would leave; what a log does not show
-//! stays 0, with its prior's.
+//! stays 0, with its prior's. Those of size and clock, and of an offset along the pushes where they go one way, hold the
+//! distance that is left as well.
 
 use measured_log::{Log, Shape};
 use nalgebra::{SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
@@ -145,13 +146,25 @@ pub fn align(log: &Log, arm: Option<&Robot>) -> Result<Alignment, String> {
         task.solve(&kept, &rests, scale_m, [true; COUNT]).0
     };
     let left: Vec<SVector<f64, COUNT>> = (0..groups).map(without).collect();
+    let distances = |x: &SVector<f64, COUNT>| {
+        let touching = rows.iter().flat_map(|rows| &rows.touching);
+        median(touching.map(|row| task.distance_m(x, row).abs()).collect()).unwrap_or(0.0)
+    };
+    // What is left where they should touch may be the same everywhere: an object that goes ahead, a hand whose shape is not quite that of its file. A size, and a
+    // clock, would explain it as well.
+    let left_m = distances(&found);
+    let ways: Vec<Vector3<f64>> = rows.iter().flat_map(|rows| &rows.touching).map(|row| row.tool_mps).collect();
+    let mps = median(ways.iter().map(Vector3::norm).collect()).unwrap_or(STANDS_MPS);
+    // So would an offset, as far as pushes go one way.
+    let way = ways.iter().map(Vector3::normalize).sum::<Vector3<f64>>() / ways.len() as f64;
+    let systematic = [left_m * way.x, left_m * way.y, 0.0, 0.0, 2.0 * left_m / width_m, left_m / mps];
     let estimates = |at: &dyn Fn(&SVector<f64, COUNT>) -> SVector<f64, COUNT>| -> [Estimate; COUNT] {
         let (value, left): (_, Vec<_>) = (at(&found), left.iter().map(at).collect());
         std::array::from_fn(|i| {
             let mean = left.iter().map(|x| x[i]).sum::<f64>() / groups as f64;
             let squares = left.iter().map(|x| (x[i] - mean).powi(2)).sum::<f64>();
             let jackknife = (groups - 1) as f64 / groups as f64 * squares;
-            Estimate { value: value[i], stddev: jackknife.max(spread[(i, i)]).sqrt() }
+            Estimate { value: value[i], stddev: jackknife.max(spread[(i, i)]).sqrt().hypot(systematic[i]) }
         })
     };
     // About the middle an offset does not hide behind a turn.
@@ -167,10 +180,6 @@ pub fn align(log: &Log, arm: Option<&Robot>) -> Result<Alignment, String> {
     };
     let [x, y, z, yaw, size, late] = estimates(&|x| task.at_origin(x));
     let factor = size.value.exp();
-    let distances = |x: &SVector<f64, COUNT>| {
-        let touching = rows.iter().flat_map(|rows| &rows.touching);
-        median(touching.map(|row| task.distance_m(x, row).abs()).collect()).unwrap_or(0.0)
-    };
     Ok(Alignment {
         translation_m: [x, y, z],
         yaw_rad: yaw,
