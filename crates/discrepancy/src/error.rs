@@ -7,6 +7,9 @@ pub enum Error {
     /// The log cannot be read.
     #[error(transparent)]
     Log(#[from] measured_log::Error),
+    /// A log of joints, or its arm, cannot be read.
+    #[error(transparent)]
+    Joints(#[from] arm_diagnosis::Error),
     /// A model cannot be built from the log's header, or from a model file.
     #[error("the nominal model: {reason}")]
     Model {

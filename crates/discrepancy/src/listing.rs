@@ -58,7 +58,24 @@ pub fn text() -> String {
         }
         text.push('\n');
     }
-    text + &format!("{} effects. The book shows what each does to a push: cargo xtask docs\n", EffectKind::ALL.len())
+    text += &format!("{} effects. The book shows what each does to a push: cargo xtask docs\n", EffectKind::ALL.len());
+    text + &of_joints()
+}
+
+/// Those that a log of joints alone may show.
+fn of_joints() -> String {
+    let mut text = String::from("\nOf an arm, by a log of its joints:\n\n");
+    for effect in arm_diagnosis::EFFECTS {
+        let place = if effect.of_joint { "of a joint" } else { "of the arm" };
+        let values = effect.parameters.iter().map(|value| match value.unit {
+            "1" => value.name.to_owned(),
+            unit => format!("{} in {unit}", value.name),
+        });
+        text += &format!("{} ({place})\n", effect.name);
+        text += &wrapped(effect.summary);
+        text += &wrapped(&values.collect::<Vec<_>>().join(", "));
+    }
+    text
 }
 
 /// Lines that begin with four spaces; further ones of the same paragraph with six.
@@ -85,6 +102,7 @@ mod tests {
         for kind in EffectKind::ALL {
             assert!(text.lines().any(|line| line == kind.name()), "{}", kind.name());
         }
+        assert!(text.contains("torque_delay (of the arm)\n") && text.contains("delay in s\n"), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= COLUMNS), "{text}");
         assert!(text.contains("c = coefficient_nspm in N·s/m: 0.1 to 2; no effect at: 0"), "{text}");
         assert!(text.contains("Looks like quadratic_drag. To tell: push and release at three speeds"), "{text}");

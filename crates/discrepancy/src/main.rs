@@ -18,12 +18,15 @@ use serde::Deserialize;
 mod bar;
 #[path = "program/folder.rs"]
 mod folder;
+#[path = "program/joints.rs"]
+mod joints;
 
 /// Finds where simulation and measurement disagree, names the missing effect, adds it to the model and shows the gap shrink.
 #[derive(Debug, Parser)]
 #[command(name = "diagnose", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Folder of the log: log.toml with samples.csv or samples.parquet (docs/src/reference/measured-log.md).
+    /// Folder of the log: log.toml with samples.csv or samples.parquet (docs/src/reference/measured-log.md), or that of an arm's joints alone
+    /// (docs/src/reference/joint-log.md).
     #[arg(long, required_unless_present = "list_effects")]
     measured: Option<PathBuf>,
     /// Model to begin with instead of the log's nominal one: the model.toml of an earlier diagnosis.
@@ -58,6 +61,14 @@ Examples:
   cargo xtask diagnose --list-effects
   cargo xtask diagnose --measured tests/data/mujoco-logs/logs/set-003 --out runs/diagnose/first";
 
+impl Arguments {
+    /// An option that a log of joints alone has no use for.
+    fn only_for_objects(&self) -> Option<&'static str> {
+        let given = [("--model", self.model.is_some()), ("--fold", self.fold.is_some())];
+        given.into_iter().find(|(_, given)| *given).map(|(option, _)| option)
+    }
+}
+
 fn main() -> ExitCode {
     // 2 is bad input; a disk that refuses is a failure.
     program::end(
@@ -79,6 +90,13 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     let Some(measured) = &arguments.measured else { return list_effects(arguments.json) };
     if let Some(root) = &arguments.root {
         check_root(root)?;
+    }
+    if arm_diagnosis::is_joint_log(measured) {
+        if let Some(option) = arguments.only_for_objects() {
+            let reason = format!("{option} is for logs with an object; {} has none", measured.display());
+            return Err(Error::Model { reason });
+        }
+        return joints::run(measured, arguments.out.as_ref(), arguments.seed, arguments.json);
     }
     let log = measured_log::read(measured)?;
     let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;

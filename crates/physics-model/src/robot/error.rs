@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
+use urdf_file::UrdfError;
 
 /// Why an arm cannot be loaded. Messages name the URDF, the key of [`super::RobotConfig`] or of the URDF, and what was expected.
 #[derive(Debug, Error)]
@@ -122,6 +123,17 @@ pub enum RobotError {
     },
 }
 
+impl From<UrdfError> for RobotError {
+    fn from(error: UrdfError) -> Self {
+        match error {
+            UrdfError::Read { path, source } => Self::Read { path, source },
+            UrdfError::Parse { path, reason } => Self::Parse { path, reason },
+            UrdfError::Joint { path, joint, problem } => Self::Joint { path, joint, problem },
+            UrdfError::Link { path, link, problem } => Self::Link { path, link, problem },
+        }
+    }
+}
+
 /// Why inverse kinematics has no solution.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
@@ -167,9 +179,9 @@ pub(super) fn unknown_link<'a>(
 }
 
 pub(super) fn joint_error(path: &Path, joint: &str, problem: &str) -> RobotError {
-    RobotError::Joint { path: path.into(), joint: quoted(joint), problem: whole_file::one_line(problem, 400) }
+    urdf_file::joint_error(path, joint, problem).into()
 }
 
 pub(super) fn link_error(path: &Path, link: &str, problem: &str) -> RobotError {
-    RobotError::Link { path: path.into(), link: quoted(link), problem: whole_file::one_line(problem, 400) }
+    urdf_file::link_error(path, link, problem).into()
 }

@@ -14,9 +14,7 @@ mod config;
 mod description;
 mod dynamics;
 mod error;
-mod file;
 mod ik;
-mod model;
 mod shapes;
 mod urdf;
 
@@ -69,11 +67,11 @@ impl Robot {
     /// If the file is missing or no URDF, if a link or joint is missing or unfit for its part, or if a value is impossible.
     pub fn load(config: &RobotConfig, base_dir: &Path) -> Result<Self, RobotError> {
         let path = base_dir.join(&config.urdf);
-        let description = file::read(&path)?;
+        let description = urdf_file::read(&path)?;
         Self::build(config, description, &path)
     }
 
-    fn build(config: &RobotConfig, description: model::Urdf, path: &Path) -> Result<Self, RobotError> {
+    fn build(config: &RobotConfig, description: urdf_file::Urdf, path: &Path) -> Result<Self, RobotError> {
         let arm = urdf::Arm::new(config, description, path)?;
         config.check_values(&arm.limits)?;
         let names: Vec<String> = arm.links.keys().cloned().collect();

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::chain::Frame;
-use super::model::{Geometry, Link};
+use urdf_file::{Geometry, Link};
 
 /// A collision primitive, fixed in the frame of `tool_link`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -117,7 +117,7 @@ mod tests {
             .map(|(xyz, g)| format!("<collision><origin xyz=\"{xyz}\"/><geometry><{g}/></geometry></collision>"))
             .collect();
         let text = format!("<robot name=\"r\"><link name=\"hand\">{body}</link></robot>");
-        let urdf = super::super::file::parse(std::path::Path::new("hand.urdf"), &text).expect("URDF");
+        let urdf = urdf_file::parse(std::path::Path::new("hand.urdf"), &text).expect("URDF");
         link_shapes(&urdf.links[0], &Frame::identity())
     }
 

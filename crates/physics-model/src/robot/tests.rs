@@ -40,7 +40,7 @@ fn config() -> RobotConfig {
 
 fn build(config: &RobotConfig, text: &str) -> Result<Robot, RobotError> {
     let path = Path::new("small.urdf");
-    Robot::build(config, file::parse(path, text).expect("URDF"), path)
+    Robot::build(config, urdf_file::parse(path, text).expect("URDF"), path)
 }
 
 fn message(change: impl FnOnce(&mut RobotConfig), text: &str) -> String {

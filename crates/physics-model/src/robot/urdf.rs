@@ -10,10 +10,10 @@ use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 use super::chain::{Chain, Frame, Inertia, Segment};
 use super::error::{joint_error, link_error, listed, quoted, unknown_link};
-use super::model::{Joint, JointKind, Link, Urdf};
 use super::shapes::{ToolShape, link_shapes};
 use super::{JointLimit, RobotConfig, RobotError};
 use crate::state::MAX_JOINTS;
+use urdf_file::{Joint, JointKind, Link, Urdf};
 
 /// No arm is longer, m, heavier, kg, or more inert, kg·m²: beyond it sums and products leave the finite numbers.
 const LONGEST_M: f64 = 1000.0;

@@ -7,80 +7,139 @@ use std::path::Path;
 use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::RobotError;
-use super::error::{joint_error, link_error};
+use crate::UrdfError;
+use crate::error::{joint_error, link_error};
 
 /// Elements, attributes and texts of a file, at most.
 const MOST_NODES: u32 = 1_000_000;
 
 /// A file.
 #[derive(Debug)]
-pub(super) struct Urdf {
-    pub(super) links: Vec<Link>,
-    pub(super) joints: Vec<Joint>,
+pub struct Urdf {
+    /// In the order of the file.
+    pub links: Vec<Link>,
+    /// In the order of the file.
+    pub joints: Vec<Joint>,
 }
 
 /// Place of a frame in another.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Origin {
+pub struct Origin {
     /// m.
-    pub(super) xyz: [f64; 3],
+    pub xyz: [f64; 3],
     /// Turns about fixed x, then y, then z, rad.
-    pub(super) rpy: [f64; 3],
+    pub rpy: [f64; 3],
 }
 
+/// A body.
 #[derive(Debug)]
-pub(super) struct Link {
-    pub(super) name: String,
-    pub(super) inertial: Inertial,
-    pub(super) collisions: Vec<(Origin, Geometry)>,
+pub struct Link {
+    /// As in the file.
+    pub name: String,
+    /// What it weighs; nothing where the file does not say.
+    pub inertial: Inertial,
+    /// Whether the file says what it weighs.
+    pub has_inertial: bool,
+    /// Shapes, each with its place in the link.
+    pub collisions: Vec<(Origin, Geometry)>,
 }
 
 /// What a link weighs; nothing where the file does not say.
 #[derive(Debug, Default)]
-pub(super) struct Inertial {
-    pub(super) origin: Origin,
-    pub(super) mass_kg: f64,
+pub struct Inertial {
+    /// Place of the centre of mass, and the axes of `inertia`.
+    pub origin: Origin,
+    /// kg.
+    pub mass_kg: f64,
     /// ixx, ixy, ixz, iyy, iyz, izz about the centre of mass, kg·m².
-    pub(super) inertia: [f64; 6],
+    pub inertia: [f64; 6],
 }
 
+/// A shape; lengths in m, along z.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Geometry {
+pub enum Geometry {
+    /// About the origin.
     Sphere {
+        /// m.
         radius: f64,
     },
+    /// About the origin.
     Cylinder {
+        /// m.
         radius: f64,
+        /// m.
         length: f64,
     },
+    /// A cylinder with half spheres at its ends.
     Capsule {
+        /// m.
         radius: f64,
+        /// Of the cylinder, m.
         length: f64,
     },
     /// A box or a mesh.
     Other,
 }
 
+/// What joins two links.
 #[derive(Debug)]
-pub(super) struct Joint {
-    pub(super) name: String,
-    pub(super) kind: JointKind,
-    pub(super) origin: Origin,
-    pub(super) parent: String,
-    pub(super) child: String,
-    pub(super) axis: [f64; 3],
-    pub(super) limit: Limit,
+pub struct Joint {
+    /// As in the file.
+    pub name: String,
+    /// How it moves.
+    pub kind: JointKind,
+    /// Its place in the parent at position 0.
+    pub origin: Origin,
+    /// Name of the link that carries it.
+    pub parent: String,
+    /// Name of the link that it carries.
+    pub child: String,
+    /// Axis in its own frame; as in the file, so not always of length 1.
+    pub axis: [f64; 3],
+    /// What it can do.
+    pub limit: Limit,
+    /// Its friction.
+    pub dynamics: Dynamics,
+    /// The joint that it follows.
+    pub mimic: Option<Mimic>,
 }
 
+/// Friction of a joint; 0 where the file does not say.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Dynamics {
+    /// N·m·s/rad or N·s/m.
+    pub damping: f64,
+    /// N·m or N.
+    pub friction: f64,
+}
+
+/// A joint that follows another: position = multiplier · other + offset.
+#[derive(Clone, Debug)]
+pub struct Mimic {
+    /// Name of the other.
+    pub joint: String,
+    /// Without unit, or m/rad.
+    pub multiplier: f64,
+    /// rad or m.
+    pub offset: f64,
+}
+
+/// How a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum JointKind {
+pub enum JointKind {
+    /// About an axis, within limits.
     Revolute,
+    /// About an axis, without limits.
     Continuous,
+    /// Along an axis.
     Prismatic,
+    /// Not at all.
     Fixed,
+    /// In all six directions.
     Floating,
+    /// In a plane.
     Planar,
+    /// About a point.
     Spherical,
 }
 
@@ -96,23 +155,27 @@ impl JointKind {
     ];
 
     /// As in a file.
-    pub(super) fn name(self) -> &'static str {
+    #[must_use]
+    pub fn name(self) -> &'static str {
         Self::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }
 }
 
-/// rad or m, and per second, N·m or N.
+/// What a joint can do: rad or m, and per second, N·m or N.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Limit {
-    pub(super) lower: f64,
-    pub(super) upper: f64,
-    pub(super) effort: f64,
-    /// Like the effort infinite where the file does not say: many do not, and nothing here uses them.
-    pub(super) velocity: f64,
+pub struct Limit {
+    /// rad or m.
+    pub lower: f64,
+    /// rad or m.
+    pub upper: f64,
+    /// N·m or N; infinite where the file does not say, as of many.
+    pub effort: f64,
+    /// rad/s or m/s; infinite where the file does not say.
+    pub velocity: f64,
 }
 
 /// Reads the text of the file at `path`, whose outermost element is `<robot>`.
-pub(super) fn read(path: &Path, text: &str) -> Result<Urdf, RobotError> {
+pub(crate) fn read(path: &Path, text: &str) -> Result<Urdf, UrdfError> {
     let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| {
         let reason = match error {
@@ -122,7 +185,7 @@ pub(super) fn read(path: &Path, text: &str) -> Result<Urdf, RobotError> {
                 300,
             ),
         };
-        RobotError::Parse { path: path.into(), reason }
+        UrdfError::Parse { path: path.into(), reason }
     })?;
     let root = document.root_element();
     let name = |node: &Node| node.attribute("name").unwrap_or("without a name").to_owned();
@@ -186,6 +249,7 @@ fn link(node: &Node) -> Result<Link, String> {
     let collisions = children(node, "collision").map(|collision| Ok((origin(&collision)?, geometry(&collision)?)));
     Ok(Link {
         name: text(node, "name")?,
+        has_inertial: inertial.is_some(),
         inertial: inertial.unwrap_or_default(),
         collisions: collisions.collect::<Result<_, String>>()?,
     })
@@ -233,19 +297,33 @@ fn joint(node: &Node) -> Result<Joint, String> {
         parent: end("parent")?,
         child: end("child")?,
         axis,
-        limit: limit.unwrap_or(Limit { lower: 0.0, upper: 0.0, effort: 0.0, velocity: f64::INFINITY }),
+        limit: limit.unwrap_or(Limit { lower: 0.0, upper: 0.0, effort: f64::INFINITY, velocity: f64::INFINITY }),
+        dynamics: child(node, "dynamics")?.map_or(Ok(Dynamics::default()), |node| dynamics(&node))?,
+        mimic: child(node, "mimic")?.map(|mimic| self::mimic(&mimic)).transpose()?,
     })
+}
+
+fn number_or(node: &Node, key: &str, default: f64) -> Result<f64, String> {
+    if node.has_attribute(key) { number(node, key) } else { Ok(default) }
+}
+
+fn dynamics(node: &Node) -> Result<Dynamics, String> {
+    Ok(Dynamics { damping: number_or(node, "damping", 0.0)?, friction: number_or(node, "friction", 0.0)? })
+}
+
+fn mimic(node: &Node) -> Result<Mimic, String> {
+    let (multiplier, offset) = (number_or(node, "multiplier", 1.0)?, number_or(node, "offset", 0.0)?);
+    Ok(Mimic { joint: text(node, "joint")?, multiplier, offset })
 }
 
 fn limit(node: &Node) -> Result<Limit, String> {
     // Version 1.2 has no limit where none is given, earlier ones have 0.
     let version = node.document().root_element().attribute("version").and_then(|text| text.trim().parse().ok());
     let free = if version.unwrap_or(1.0_f64) > 1.15 { f64::INFINITY } else { 0.0 };
-    let or = |key, value: f64| if node.has_attribute(key) { number(node, key) } else { Ok(value) };
     Ok(Limit {
-        lower: or("lower", -free)?,
-        upper: or("upper", free)?,
-        effort: or("effort", f64::INFINITY)?,
-        velocity: or("velocity", f64::INFINITY)?,
+        lower: number_or(node, "lower", -free)?,
+        upper: number_or(node, "upper", free)?,
+        effort: number_or(node, "effort", f64::INFINITY)?,
+        velocity: number_or(node, "velocity", f64::INFINITY)?,
     })
 }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::RobotError;
-use super::model::{self, Urdf};
+use crate::UrdfError;
+use crate::model::{self, Urdf};
 
 /// Size of a file.
 const MOST_BYTES: u64 = 16 << 20;
@@ -16,19 +16,27 @@ const MOST_NAMESPACES: usize = 200;
 const MOST_LINKS: usize = 1000;
 
 /// Reads a file of bounded size, depth, number of links and of attributes.
-pub(super) fn read(path: &Path) -> Result<Urdf, RobotError> {
+///
+/// # Errors
+///
+/// [`UrdfError`] if it cannot be read, is another format, or an element is not as URDF has it.
+pub fn read(path: &Path) -> Result<Urdf, UrdfError> {
     let bytes = whole_file::read(path, MOST_BYTES)
-        .map_err(|error| RobotError::Read { path: path.into(), source: error.source })?;
+        .map_err(|error| UrdfError::Read { path: path.into(), source: error.source })?;
     let text = std::str::from_utf8(&bytes).map_err(|error| {
         let reason = format!("expected UTF-8 text, found another byte at {}", error.valid_up_to());
-        RobotError::Parse { path: path.into(), reason }
+        UrdfError::Parse { path: path.into(), reason }
     })?;
     parse(path, text)
 }
 
 /// Parses the text of the file at `path`.
-pub(super) fn parse(path: &Path, text: &str) -> Result<Urdf, RobotError> {
-    let refuse = |reason: &str| RobotError::Parse { path: path.into(), reason: whole_file::one_line(reason, 300) };
+///
+/// # Errors
+///
+/// [`UrdfError`] if it is another format, or an element is not as URDF has it.
+pub fn parse(path: &Path, text: &str) -> Result<Urdf, UrdfError> {
+    let refuse = |reason: &str| UrdfError::Parse { path: path.into(), reason: whole_file::one_line(reason, 300) };
     if let Some(problem) = other_format(text) {
         return Err(refuse(&problem));
     }
@@ -202,6 +210,6 @@ mod tests {
             assert!(!message.contains(char::is_control) && message.len() < 600, "{message:?}");
         }
         std::fs::remove_dir_all(&folder).unwrap();
-        assert!(matches!(read(Path::new("/dev/zero")), Err(RobotError::Read { .. })));
+        assert!(matches!(read(Path::new("/dev/zero")), Err(UrdfError::Read { .. })));
     }
 }

@@ -1,0 +1,359 @@
+//! Which hypotheses a log asks for: forward by evidence, each choice looked at again when the others stand.
+
+use arm_dynamics::{Mass, PARAMETERS};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use crate::design::{Columns, Design};
+use crate::effect::EFFECTS;
+use crate::features::{Candidate, Catalogue};
+use crate::fit::Fit;
+use crate::group::{coefficient, is_friction};
+use crate::prepared::Prepared;
+
+/// Hypotheses of a model, at most.
+const MOST_TERMS: usize = 16;
+/// Gain of evidence that a finer kind of friction must have over a simpler one: twenty to one.
+const AS_GOOD: f64 = 3.0;
+/// Rounds in which each choice is looked at again.
+const ROUNDS: usize = 3;
+/// Factors by which the masses of a file may be worse than usual.
+const MASS_FACTORS: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
+
+/// A hypothesis that a model has, what it brings, and others that would bring nearly as much.
+#[derive(Clone, Debug)]
+pub(crate) struct Term {
+    /// Place in the catalogue.
+    pub(crate) candidate: usize,
+    /// ln of the evidence with it over that without, and with its prior.
+    pub(crate) gain: f64,
+    /// Places of others in its stead, with their gains, best first.
+    pub(crate) rivals: Vec<(usize, f64)>,
+}
+
+/// A log's best model.
+pub(crate) struct Found {
+    pub(crate) catalogue: Catalogue,
+    pub(crate) design: Design,
+    pub(crate) all: Columns,
+    pub(crate) terms: Vec<Term>,
+    pub(crate) mass_factor: f64,
+    /// The fit with all terms, and the one without any.
+    pub(crate) fit: Fit,
+    pub(crate) null: Fit,
+}
+
+pub(crate) struct Search {
+    catalogue: Catalogue,
+    joints: usize,
+    design: Design,
+    all: Columns,
+    mass_factor: f64,
+}
+
+impl Search {
+    /// Learns what no hypothesis explains, and how good the masses are.
+    pub(crate) fn new(prepared: &Prepared, catalogue: Catalogue, mut design: Design) -> Option<Self> {
+        let everything = everything(&catalogue);
+        let mut factor = 4.0;
+        for round in 0..4 {
+            let all = Columns::new(&design, &catalogue);
+            let fit_with = |factor: f64| Fit::new(&all, everything.clone(), &stddevs(&catalogue, &everything, factor));
+            if round >= 2 {
+                let fits =
+                    MASS_FACTORS.par_iter().filter_map(|factor| Some((*factor, fit_with(*factor)?.log_evidence)));
+                let best = fits.collect::<Vec<_>>().into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+                factor = best.0;
+            }
+            let fit = fit_with(factor)?;
+            let left = left(&design.gap, &catalogue, &fit, prepared);
+            let coefficients: Vec<(usize, f64)> =
+                fit.columns.iter().copied().zip(fit.coefficients.iter().copied()).collect();
+            design.learn(&left, fit.effective(), &coulomb(prepared, &catalogue, &coefficients), prepared);
+        }
+        let all = Columns::new(&design, &catalogue);
+        Some(Self { catalogue, joints: prepared.joints(), design, all, mass_factor: factor })
+    }
+
+    pub(crate) fn run(self) -> Option<Found> {
+        let null = self.fit(&[])?;
+        let mut chosen: Vec<usize> = Vec::new();
+        let mut terms = Vec::new();
+        for _ in 0..ROUNDS {
+            let before = chosen.clone();
+            while chosen.len() < MOST_TERMS {
+                let Some((best, _)) = self.ranked(&chosen)?.into_iter().next().filter(|(_, gain)| *gain > 0.0) else {
+                    break;
+                };
+                self.add(&mut chosen, best);
+            }
+            terms = self.looked_at_again(&mut chosen)?;
+            if chosen == before {
+                break;
+            }
+        }
+        let fit = self.fit(&chosen)?;
+        Some(Found {
+            catalogue: self.catalogue,
+            terms,
+            mass_factor: self.mass_factor,
+            fit,
+            null,
+            all: self.all,
+            design: self.design,
+        })
+    }
+
+    /// An extension of a joint's friction takes the place of the plain one.
+    fn add(&self, chosen: &mut Vec<usize>, candidate: usize) {
+        let added = &self.catalogue.candidates[candidate];
+        chosen.retain(|other| {
+            let other = &self.catalogue.candidates[*other];
+            !(other.joint == added.joint && other.effect.name == "joint_friction" && added.effect.extends_friction())
+        });
+        chosen.push(candidate);
+    }
+
+    /// Takes each term out and puts the best one in, until nothing changes; the terms with what they bring.
+    fn looked_at_again(&self, chosen: &mut Vec<usize>) -> Option<Vec<Term>> {
+        let mut terms = Vec::new();
+        let mut place = 0;
+        while place < chosen.len() {
+            let mut others = chosen.clone();
+            others.remove(place);
+            let ranked = self.ranked(&others)?;
+            match ranked.first().copied() {
+                Some((best, gain)) if gain > 0.0 => {
+                    chosen[place] = best;
+                    terms.push(Term { candidate: best, gain, rivals: ranked[1..].iter().take(400).copied().collect() });
+                    place += 1;
+                }
+                _ => {
+                    chosen.remove(place);
+                }
+            }
+        }
+        Some(terms)
+    }
+
+    fn fit(&self, chosen: &[usize]) -> Option<Fit> {
+        let columns = columns(&self.catalogue, chosen);
+        let stddevs = stddevs(&self.catalogue, &columns, self.mass_factor);
+        Fit::new(&self.all, columns, &stddevs)
+    }
+
+    /// All hypotheses that may join some, by ln of posterior odds, best first.
+    fn ranked(&self, chosen: &[usize]) -> Option<Vec<(usize, f64)>> {
+        let fit = self.fit(chosen)?;
+        let spreads = stddevs(&self.catalogue, &fit.columns, self.mass_factor);
+        let gain = |(place, candidate): (usize, &Candidate)| {
+            if !self.may_join(candidate, chosen) {
+                return None;
+            }
+            let new = candidate.features.iter().filter(|feature| !fit.columns.contains(feature));
+            let new: Vec<(usize, f64)> =
+                new.map(|feature| (*feature, self.catalogue.features[*feature].stddev)).collect();
+            if new.is_empty() {
+                return None;
+            }
+            let (mut gain, coefficients) = fit.gain(&self.all, &spreads, &new)?;
+            for ((feature, _), [value, stddev]) in new.iter().zip(&coefficients) {
+                if self.catalogue.features[*feature].positive {
+                    // Half of the prior is cut off, and what of the posterior is on the wrong side.
+                    gain += std::f64::consts::LN_2 + log_cdf(value / stddev);
+                }
+            }
+            Some((place, gain + self.log_prior(candidate, chosen)))
+        };
+        let mut ranked: Vec<(usize, f64)> = self
+            .catalogue
+            .candidates
+            .par_iter()
+            .enumerate()
+            .filter_map(gain)
+            .filter(|(_, gain)| gain.is_finite())
+            .collect();
+        ranked.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        self.prefer_simpler(&mut ranked);
+        Some(ranked)
+    }
+
+    /// Brings to the front the kind of friction with the fewest values of those that explain the same joint as well as the first: which share of a load's friction
+    /// is that of lifting, for one, looks like a gain of torque.
+    fn prefer_simpler(&self, ranked: &mut [(usize, f64)]) {
+        let Some(&(first, most)) = ranked.first() else { return };
+        let own = &self.catalogue.candidates[first];
+        if !own.effect.extends_friction() {
+            return;
+        }
+        let size = |place: usize| self.catalogue.candidates[place].features.len();
+        let as_good = ranked.iter().enumerate().filter(|(_, (place, gain))| {
+            let other = &self.catalogue.candidates[*place];
+            most - gain < AS_GOOD && other.joint == own.joint && is_friction(other.effect) && size(*place) < size(first)
+        });
+        if let Some((place, _)) = as_good.min_by_key(|(_, (place, _))| size(*place)) {
+            ranked[..=place].rotate_right(1);
+        }
+    }
+
+    /// Not the same effect twice in a place, nor two kinds of friction in one joint.
+    fn may_join(&self, candidate: &Candidate, chosen: &[usize]) -> bool {
+        chosen.iter().all(|other| {
+            let other = &self.catalogue.candidates[*other];
+            let same = other.effect.name == candidate.effect.name && other.joint == candidate.joint;
+            let both_extend = other.joint == candidate.joint
+                && candidate.effect.extends_friction()
+                && other.effect.extends_friction();
+            let less = other.joint == candidate.joint
+                && other.effect.extends_friction()
+                && candidate.effect.name == "joint_friction";
+            !(same || both_extend || less)
+        })
+    }
+
+    /// Each effect is as likely as any, in any joint and setting; one that a joint has already is likely in another.
+    fn log_prior(&self, candidate: &Candidate, chosen: &[usize]) -> f64 {
+        let same = |other: &usize| self.catalogue.candidates[*other].effect.name == candidate.effect.name;
+        let settings = self
+            .catalogue
+            .candidates
+            .iter()
+            .filter(|other| other.effect.name == candidate.effect.name && other.joint == candidate.joint)
+            .count();
+        let settings = -(settings as f64).ln();
+        if chosen.iter().any(same) {
+            return settings - std::f64::consts::LN_2;
+        }
+        let joints = if candidate.joint.is_some() { self.joints as f64 } else { 1.0 };
+        settings - (EFFECTS.len() as f64).ln() - joints.ln()
+    }
+}
+
+/// Coulomb friction of each joint, N·m: what the file says, and what a fit with all kinds of friction at once has found.
+fn coulomb(prepared: &Prepared, catalogue: &Catalogue, coefficients: &[(usize, f64)]) -> Vec<f64> {
+    let found = |joint: usize| -> f64 {
+        let own = |candidate: &&Candidate| candidate.joint == Some(joint);
+        let constant = |candidate: &&Candidate| ["joint_friction", "presliding"].contains(&candidate.effect.name);
+        let mut columns: Vec<usize> = Vec::new();
+        for candidate in catalogue.candidates.iter().filter(own).filter(constant) {
+            // Of plain friction the first column, of bristles the last.
+            let column = if candidate.effect.name == "joint_friction" {
+                candidate.features.first()
+            } else {
+                candidate.features.last()
+            };
+            columns.extend(column);
+        }
+        columns.sort_unstable();
+        columns.dedup();
+        coefficients.iter().filter(|(column, _)| columns.contains(column)).map(|(_, coefficient)| coefficient).sum()
+    };
+    (0..prepared.joints()).map(|joint| prepared.log.arm.joints()[joint].friction + found(joint)).collect()
+}
+
+/// ln of the normal distribution function; far out by its asymptote.
+fn log_cdf(z: f64) -> f64 {
+    if z > -8.0 { Normal::standard().cdf(z).ln() } else { -0.5 * z * z - (-z).ln() - 0.5 * std::f64::consts::TAU.ln() }
+}
+
+/// Nuisances, and the columns of some candidates.
+pub(crate) fn columns(catalogue: &Catalogue, chosen: &[usize]) -> Vec<usize> {
+    let mut columns = catalogue.nuisances.clone();
+    for candidate in chosen {
+        for feature in &catalogue.candidates[*candidate].features {
+            if !columns.contains(feature) {
+                columns.push(*feature);
+            }
+        }
+    }
+    columns
+}
+
+/// Prior standard deviations, those of masses times a factor.
+pub(crate) fn stddevs(catalogue: &Catalogue, columns: &[usize], mass_factor: f64) -> Vec<f64> {
+    columns
+        .iter()
+        .map(|column| {
+            let factor = if catalogue.masses.contains(column) { mass_factor } else { 1.0 };
+            catalogue.features[*column].stddev * factor
+        })
+        .collect()
+}
+
+/// Nuisances and one setting of each effect in each joint: the best description at hand, whatever is true.
+fn everything(catalogue: &Catalogue) -> Vec<usize> {
+    let of = |candidate: &Candidate| {
+        let alike: Vec<&Candidate> = catalogue
+            .candidates
+            .iter()
+            .filter(|other| other.effect.name == candidate.effect.name && other.joint == candidate.joint)
+            .collect();
+        // Of many settings the middle; of a ripple's those that would pass for a drift, as many waves would take the noise for their own.
+        if candidate.effect.name == "torque_ripple" {
+            return candidate.setting <= 4.0;
+        }
+        alike[alike.len() / 2].setting == candidate.setting
+    };
+    let chosen: Vec<usize> =
+        (0..catalogue.candidates.len()).filter(|place| of(&catalogue.candidates[*place])).collect();
+    columns(catalogue, &chosen)
+}
+
+impl Found {
+    /// Masses of the links as they were fitted, a payload's included, in the frames of the joints.
+    pub(crate) fn masses(&self, prepared: &Prepared) -> Vec<Mass> {
+        let last = prepared.joints() - 1;
+        let payload = self.catalogue.candidates.iter().find(|candidate| candidate.effect.name == "payload");
+        let file = prepared.log.arm.masses().enumerate();
+        let fitted = |(link, mass): (usize, &Mass)| {
+            let mut numbers = mass.numbers();
+            for (number, value) in numbers.iter_mut().enumerate() {
+                *value += coefficient(self, self.catalogue.masses[link * PARAMETERS + number]);
+                if let Some(payload) = payload.filter(|_| link == last) {
+                    *value += coefficient(self, payload.features[number]);
+                }
+            }
+            Mass::from_numbers(&numbers)
+        };
+        file.map(fitted).collect()
+    }
+
+    /// Factors of torque as they were fitted.
+    pub(crate) fn gains(&self, joints: usize) -> Vec<f64> {
+        let gain = |joint: usize| {
+            let own = |candidate: &&Candidate| {
+                candidate.joint == Some(joint) && ["torque_gain", "servo_gain"].contains(&candidate.effect.name)
+            };
+            let column = self.catalogue.candidates.iter().find(own).map(|candidate| candidate.features[0]);
+            let columns =
+                column.into_iter().flat_map(|column| [Some(column), self.catalogue.features[column].twin]).flatten();
+            (1.0 + columns.map(|column| coefficient(self, column)).sum::<f64>()).clamp(0.2, 5.0)
+        };
+        (0..joints).map(gain).collect()
+    }
+
+    /// Delay of torques as it was fitted, s.
+    pub(crate) fn delay_secs(&self) -> f64 {
+        let delay = self.catalogue.candidates.iter().find(|candidate| candidate.effect.name == "torque_delay");
+        let columns = delay.map(|delay| delay.features[0]).into_iter();
+        columns
+            .flat_map(|column| [Some(column), self.catalogue.features[column].twin])
+            .flatten()
+            .map(|column| coefficient(self, column))
+            .sum()
+    }
+}
+
+/// What a fit leaves of the gap, joint after joint, N·m.
+pub(crate) fn left(gap: &[f64], catalogue: &Catalogue, fit: &Fit, prepared: &Prepared) -> Vec<f64> {
+    let windows = prepared.windows.len();
+    let mut left = gap.to_vec();
+    for (column, coefficient) in fit.columns.iter().zip(fit.coefficients.iter()) {
+        let feature = &catalogue.features[*column];
+        let start = feature.joint.map_or(0, |joint| joint * windows);
+        for (value, change) in left[start..].iter_mut().zip(&feature.values) {
+            *value -= coefficient * change;
+        }
+    }
+    left
+}

@@ -1,0 +1,199 @@
+//! Values of the parameters of what was found, with intervals.
+//!
+//! Standard deviations are the larger of the model's own and of a sandwich over pieces (Liang and Zeger 1986), as rows of a piece err alike.
+
+use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use serde::Serialize;
+
+use crate::fit::Fit;
+use crate::prepared::Prepared;
+use crate::search::{Found, Term, stddevs};
+
+/// Of a normal number, from its mean to the end of its 90 % interval, in standard deviations.
+const NINETY: f64 = 1.644_853_626_951_472_2;
+
+/// A parameter's value.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Value {
+    /// Name of the parameter.
+    pub name: &'static str,
+    /// SI.
+    pub unit: &'static str,
+    /// Best value.
+    pub value: f64,
+    /// From the 5 % to the 95 % quantile.
+    pub interval90: [f64; 2],
+}
+
+/// Covariance of all coefficients of the fit.
+pub(crate) fn covariance(prepared: &Prepared, found: &Found) -> DMatrix<f64> {
+    let fit = &found.fit;
+    let spreads = stddevs(&found.catalogue, &fit.columns, found.mass_factor);
+    let model = fit.covariance(&spreads);
+    let sandwich = sandwich(prepared, found, fit, &model);
+    let wider =
+        DVector::from_fn(fit.columns.len(), |i, _| (sandwich[(i, i)] / model[(i, i)].max(1e-300)).max(1.0).sqrt());
+    DMatrix::from_fn(fit.columns.len(), fit.columns.len(), |i, j| model[(i, j)] * wider[i] * wider[j])
+}
+
+fn sandwich(prepared: &Prepared, found: &Found, fit: &Fit, model: &DMatrix<f64>) -> DMatrix<f64> {
+    let rows = &found.design.fitted;
+    let left = fit.left(&found.all, rows);
+    let mut scores: DMatrix<f64> = DMatrix::zeros(fit.columns.len(), prepared.pieces);
+    for (i, column) in fit.columns.iter().enumerate() {
+        let white = &found.all.white[*column];
+        let start = white.joint.map_or(0, |joint| rows.of(joint).start);
+        for (k, value) in white.values.iter().enumerate() {
+            let row = &rows.rows[start + k];
+            scores[(i, prepared.piece[row.window])] += value * left[start + k];
+        }
+    }
+    let pieces = (0..prepared.pieces).filter(|piece| scores.column(*piece).amax() > 0.0).count() as f64;
+    let outer = &scores * scores.transpose() * (pieces / (pieces - 1.0).max(1.0));
+    model * outer * model
+}
+
+/// Coefficients of a term with their covariance, those of a nuisance that is the same column added.
+fn coefficients(found: &Found, covariance: &DMatrix<f64>, features: &[usize]) -> (Vec<f64>, DMatrix<f64>) {
+    let fit = &found.fit;
+    let places: Vec<Vec<usize>> = features
+        .iter()
+        .map(|feature| {
+            let alike =
+                |column: &usize| *column == *feature || found.catalogue.features[*feature].twin == Some(*column);
+            (0..fit.columns.len()).filter(|place| alike(&fit.columns[*place])).collect()
+        })
+        .collect();
+    let sum = |places: &Vec<usize>| places.iter().map(|place| fit.coefficients[*place]).sum();
+    let values = places.iter().map(sum).collect();
+    let matrix = DMatrix::from_fn(features.len(), features.len(), |i, j| {
+        places[i].iter().flat_map(|a| places[j].iter().map(|b| covariance[(*a, *b)])).sum()
+    });
+    (values, matrix)
+}
+
+/// The parameters of a term.
+pub(crate) fn values(prepared: &Prepared, found: &Found, covariance: &DMatrix<f64>, term: &Term) -> Vec<Value> {
+    let candidate = &found.catalogue.candidates[term.candidate];
+    let (c, matrix) = coefficients(found, covariance, &candidate.features);
+    let known = candidate.joint.map(|joint| &prepared.log.arm.joints()[joint]);
+    let (friction, damping) = known.map_or((0.0, 0.0), |joint| (joint.friction, joint.damping));
+    let own = |i: usize| (c[i], matrix[(i, i)].max(0.0).sqrt());
+    let plus = |i: usize, more: f64| (c[i] + more, own(i).1);
+    let wave = || {
+        let amplitude = c[0].hypot(c[1]).max(1e-300);
+        let (a, b) = (c[0] / amplitude, c[1] / amplitude);
+        let along = (a * a * matrix[(0, 0)] + b * b * matrix[(1, 1)] + 2.0 * a * b * matrix[(0, 1)]).max(0.0).sqrt();
+        let across = (b * b * matrix[(0, 0)] + a * a * matrix[(1, 1)] - 2.0 * a * b * matrix[(0, 1)]).max(0.0).sqrt();
+        [(amplitude, along), (b.atan2(a), across / amplitude)]
+    };
+    let slides = known.is_some_and(|joint| joint.slides);
+    let normal: Vec<(f64, f64)> = match candidate.effect.name {
+        "joint_friction" => vec![plus(0, friction), plus(1, damping)],
+        "stribeck_friction" | "load_friction" => vec![plus(0, friction), plus(1, damping), own(2)],
+        "directional_friction" | "drifting_friction" => vec![plus(0, friction), plus(1, damping), own(2), own(3)],
+        "presliding" => vec![plus(0, damping), plus(1, friction)],
+        "torque_ripple" | "encoder_eccentricity" => wave().to_vec(),
+        "reflected_inertia" => vec![plus(0, candidate.joint.map_or(0.0, |joint| prepared.reflected_inertia(joint)))],
+        "torque_gain" => vec![plus(0, 1.0)],
+        // The error of position times the stiffness that was said is what is compared.
+        "servo_gain" => {
+            let scale = (1.0 + c[0]).max(1e-3);
+            vec![(1.0 / scale, own(0).1 / (scale * scale))]
+        }
+        "joint_elasticity" => {
+            let give = c[0].max(1e-12);
+            return vec![inverse(candidate.effect.parameters[0], slides, give, own(0).1)];
+        }
+        "torque_saturation" | "command_delay" => Vec::new(),
+        "payload" => payload(prepared, &c, &matrix),
+        _ => (0..c.len()).map(own).collect(),
+    };
+    let mut values: Vec<Value> = normal
+        .into_iter()
+        .zip(candidate.effect.parameters)
+        .map(|((value, stddev), parameter)| Value {
+            name: parameter.name,
+            unit: unit(parameter.unit, slides),
+            value,
+            interval90: [value - NINETY * stddev, value + NINETY * stddev],
+        })
+        .collect();
+    if let Some(parameter) = candidate.effect.parameters.get(values.len()) {
+        let [low, high] = settings(found, term);
+        values.push(Value {
+            name: parameter.name,
+            unit: unit(parameter.unit, slides),
+            value: candidate.setting,
+            interval90: [low, high],
+        });
+    }
+    values
+}
+
+/// The unit of a joint that slides for that of one that turns.
+fn unit(turning: &'static str, slides: bool) -> &'static str {
+    const SLIDING: [(&str, &str); 8] = [
+        ("N m", "N"),
+        ("N m s/rad", "N s/m"),
+        ("rad/s", "m/s"),
+        ("rad", "m"),
+        ("kg m2", "kg"),
+        ("N m/rad", "N/m"),
+        ("N m/s", "N/s"),
+        ("1", "1"),
+    ];
+    let found = SLIDING.iter().find(|(unit, _)| slides && *unit == turning);
+    found.map_or(turning, |(_, unit)| unit)
+}
+
+fn inverse(parameter: crate::effect::Parameter, slides: bool, value: f64, stddev: f64) -> Value {
+    let (low, high) = (value + NINETY * stddev, (value - NINETY * stddev).max(1e-3 * value));
+    Value {
+        name: parameter.name,
+        unit: unit(parameter.unit, slides),
+        value: 1.0 / value,
+        interval90: [1.0 / low, 1.0 / high],
+    }
+}
+
+/// Settings whose evidence is within a factor of four, half way to the next ones.
+fn settings(found: &Found, term: &Term) -> [f64; 2] {
+    let all = &found.catalogue.candidates;
+    let own = &all[term.candidate];
+    let alike = |place: usize| all[place].effect.name == own.effect.name && all[place].joint == own.joint;
+    let mut grid: Vec<f64> = (0..all.len()).filter(|place| alike(*place)).map(|place| all[place].setting).collect();
+    grid.sort_by(f64::total_cmp);
+    let near = term.rivals.iter().filter(|(place, gain)| alike(*place) && term.gain - gain < 4.0_f64.ln());
+    let (mut low, mut high) = (own.setting, own.setting);
+    for (place, _) in near {
+        low = low.min(all[*place].setting);
+        high = high.max(all[*place].setting);
+    }
+    let below = grid.iter().copied().filter(|setting| *setting < low).fold(f64::NAN, f64::max);
+    let above = grid.iter().copied().filter(|setting| *setting > high).fold(f64::NAN, f64::min);
+    let middle = |a: f64, b: f64| if b.is_nan() { a } else { (a * b).abs().sqrt() };
+    [middle(low, below), middle(high, above)]
+}
+
+/// Mass and its centre in the frame of the tip, from the numbers about the last joint.
+fn payload(prepared: &Prepared, c: &[f64], matrix: &DMatrix<f64>) -> Vec<(f64, f64)> {
+    let centre = |c: &[f64]| -> Vector3<f64> {
+        let mass = if c[0].abs() < 1e-6 { 1e-6 } else { c[0] };
+        let place = Point3::from(Vector3::new(c[1], c[2], c[3]) / mass);
+        (prepared.log.arm.last_from_tip().inverse() * place).coords
+    };
+    let at = centre(c);
+    let mut all = vec![(c[0], matrix[(0, 0)].max(0.0).sqrt())];
+    for axis in 0..3 {
+        let slope = DVector::from_fn(4, |i, _| {
+            let step = (1e-4 * c[i].abs()).max(1e-9);
+            let mut beside = c.to_vec();
+            beside[i] += step;
+            (centre(&beside)[axis] - at[axis]) / step
+        });
+        let variance = (slope.transpose() * matrix.view((0, 0), (4, 4)) * &slope)[(0, 0)];
+        all.push((at[axis], variance.max(0.0).sqrt()));
+    }
+    all
+}
