@@ -318,6 +318,11 @@ fn the_guide_to_your_own_logs_works() {
 }
 
 #[test]
+fn the_guide_to_an_arm_and_its_joints_works() {
+    play("docs/src/guides/joints.md");
+}
+
+#[test]
 fn the_guide_to_your_own_effect_works() {
     play("docs/src/guides/effect.md");
 }

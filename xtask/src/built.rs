@@ -20,9 +20,10 @@ fn package(binary: &str) -> &str {
         "train" | "calibrate" => "prior-training",
         "eval" => "experiments",
         "demo" => "report",
-        "record-log" | "diagnose-learn" => "diagnose-benchmark",
+        "record-log" | "diagnose-learn" | "arm-learn" => "diagnose-benchmark",
         "diagnose" | "log" => "discrepancy",
         "docs" => "book",
+        "robot" => "arm-dynamics",
         // Called like their packages.
         other => other,
     }

@@ -8,9 +8,9 @@ use clap::{Command, CommandFactory as _};
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Try it", &["doctor", "demo", "report", "rerun"]),
     ("Plan: how often does it succeed?", &["eval", "scenario"]),
-    ("Diagnose a log of a robot", &["import-log", "record-log", "log", "diagnose"]),
+    ("Diagnose a log of a robot", &["import-log", "record-log", "log", "robot", "diagnose"]),
     ("Train a prior", &["datagen", "train", "calibrate"]),
-    ("Measure the project itself", &["bench", "diagnose-benchmark", "diagnose-learn"]),
+    ("Measure the project itself", &["bench", "diagnose-benchmark", "diagnose-learn", "arm-learn"]),
     ("Develop", &["docs", "ci", "completions"]),
 ];
 

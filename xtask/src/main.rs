@@ -49,6 +49,9 @@ enum Verb {
     /// Records a log in the true world of a scenario, to rehearse a diagnosis.
     #[command(disable_help_flag = true)]
     RecordLog(Rest),
+    /// Shows what a URDF file says about an arm: joints, limits, masses, torques, reach, and what looks wrong.
+    #[command(disable_help_flag = true)]
+    Robot(Rest),
     /// Looks at a log before anything is concluded from it: units, frames, sizes, clocks, sensors.
     #[command(disable_help_flag = true)]
     Log(Rest),
@@ -61,6 +64,9 @@ enum Verb {
     /// Learns how diagnose decides from logs of other engines, and judges it on the engine left out.
     #[command(disable_help_flag = true)]
     DiagnoseLearn(Rest),
+    /// Learns how the diagnosis of arms decides from simulated logs of joints, and judges it on the engine left out.
+    #[command(disable_help_flag = true)]
+    ArmLearn(Rest),
     /// Measures time and accuracy, beside other programs where those are installed.
     #[command(disable_help_flag = true)]
     Bench(Rest),
@@ -111,6 +117,8 @@ fn main() -> ExitCode {
         Verb::Diagnose(rest) => become_program("diagnose", &rest.arguments),
         Verb::DiagnoseBenchmark(rest) => become_program("diagnose-benchmark", &rest.arguments),
         Verb::DiagnoseLearn(rest) => become_program("diagnose-learn", &rest.arguments),
+        Verb::ArmLearn(rest) => become_program("arm-learn", &rest.arguments),
+        Verb::Robot(rest) => become_program("robot", &rest.arguments),
         Verb::Bench(rest) => become_program("bench", &rest.arguments),
         Verb::Scenario(rest) => become_program("scenario", &rest.arguments),
         Verb::Docs(rest) => become_program("docs", &rest.arguments),
