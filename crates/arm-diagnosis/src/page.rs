@@ -41,13 +41,13 @@ fn figures(diagnosis: &Diagnosis) -> Vec<(String, Markup)> {
 
 fn effects(report: &Report) -> Markup {
     let row = |name: &str, confidence: f64, joint: &InJoint| {
-        let values: Vec<String> = joint.parameters.iter().map(value).collect();
+        let values = html! { @for parameter in &joint.parameters { (value(parameter)) br; } };
         vec![
             text(name),
             text(joint.joint_name.as_deref().unwrap_or("the arm")),
             text(joint.form),
             text(fixed(confidence, 2)),
-            text(values.join("; ")),
+            values,
         ]
     };
     let named = &report.diagnosis.effects;
@@ -90,7 +90,7 @@ fn located(report: &Report) -> Markup {
 /// Means over ranges of speed, before and after.
 fn curves(report: &Report) -> Markup {
     html! {
-        p { "What the re-tuned nominal model leaves (light) and what the model with all that was found leaves (dark), means over ranges of speed." }
+        p { "What the re-tuned nominal model leaves (orange) and what the model with all that was found leaves (blue), means over ranges of speed." }
         @for (joint, name) in report.joints.iter().enumerate() {
             figure { (curve(&report.diagnosis.curves[joint])) figcaption { (name) } }
         }
@@ -128,7 +128,7 @@ fn curve(points: &[[f64; 3]]) -> Markup {
             line x1="260" x2="260" y1="0" y2="150" stroke="currentColor" stroke-opacity="0.3" {}
             polyline points=(line(|point| point.1)) fill="none" stroke="#e08a3c" stroke-width="2" {}
             polyline points=(line(|point| point.2)) fill="none" stroke="#1f6f8b" stroke-width="2" {}
-            text x="4" y="166" font-size="12" fill="currentColor" { (label) }
+            text x="4" y="166" font-size="9" fill="currentColor" { (label) }
         }
     }
 }

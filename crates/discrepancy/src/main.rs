@@ -93,8 +93,8 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     if arm_diagnosis::is_joint_log(measured) {
         if let Some(option) = arguments.only_for_objects() {
-            let reason = format!("{option} is for logs with an object; {} has none", measured.display());
-            return Err(Error::Model { reason });
+            let reason = format!("has no object, and {option} is for logs that have one");
+            return Err(Error::Unfit { log: measured.display().to_string(), reason });
         }
         return joints::run(measured, arguments.out.as_ref(), arguments.seed, arguments.json);
     }

@@ -27,8 +27,10 @@ def drawn_urdf(rng: np.random.Generator) -> str:
     text = ['<robot name="drawn">', '  <link name="base"/>']
 
     def link(name: str) -> str:
+        # From the second moments of a cloud of mass: then it is that of a body.
         root = rng.normal(size=(3, 3)) * 0.1
-        moment = root @ root.T + 0.01 * np.eye(3)
+        spread = root @ root.T + 0.005 * np.eye(3)
+        moment = np.trace(spread) * np.eye(3) - spread
         keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
         inertia = " ".join(f'{key}="{moment["xyz".index(key[1]), "xyz".index(key[2])]:.9g}"' for key in keys)
         return (f'  <link name="{name}"><inertial><origin xyz="{numbers(rng.uniform(-0.2, 0.2, 3))}" rpy="{numbers(rng.uniform(-2, 2, 3))}"/>'

@@ -90,7 +90,7 @@ fn run(options: &Checked) -> Result<bool, Error> {
     if let Some(root) = &options.root {
         check_root(root)?;
     }
-    let log = measured_log::read(&options.log)?;
+    let log = read(&options.log)?;
     let tool = rig_tool(&log, options.root.as_deref())?;
     let check = warning::check(&log, &tool);
     let nominal = Nominal::new(&log.header, tool)?;
@@ -111,11 +111,20 @@ fn run(options: &Checked) -> Result<bool, Error> {
     Ok(!check.suspicions.is_empty())
 }
 
+/// A log with an object.
+fn read(folder: &Path) -> Result<measured_log::Log, Error> {
+    if arm_diagnosis::is_joint_log(folder) {
+        let reason = "is a log of an arm's joints, which `diagnose` reads and this program does not";
+        return Err(Error::Unfit { log: folder.display().to_string(), reason: reason.into() });
+    }
+    Ok(measured_log::read(folder)?)
+}
+
 fn align(options: &Aligned) -> Result<(), Error> {
     if let Some(root) = &options.root {
         check_root(root)?;
     }
-    let log = measured_log::read(&options.log)?;
+    let log = read(&options.log)?;
     let tool = rig_tool(&log, options.root.as_deref())?;
     let arm = if let RigTool::Arm(arm) = &tool { Some(&**arm) } else { None };
     let unfit = |reason| Error::Unfit { log: options.log.display().to_string(), reason };
