@@ -7,7 +7,6 @@
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::effect::Effect;
@@ -91,7 +90,8 @@ impl Logistic {
     }
 
     /// 1, then the features in their units.
-    fn row(&self, features: &[f64]) -> Vec<f64> {
+    #[must_use]
+    pub fn row(&self, features: &[f64]) -> Vec<f64> {
         let scaled = features
             .iter()
             .zip(&self.center)
@@ -99,53 +99,9 @@ impl Logistic {
             .map(|((value, center), spread)| (value - center) / spread);
         std::iter::once(1.0).chain(scaled).collect()
     }
-
-    /// Fits to examples by Newton steps on the penalised likelihood: weights are standard normal before, in units of the features' standard deviations; the offset is free.
-    #[must_use]
-    pub fn learn(names: &[&str], examples: &[(Vec<f64>, bool)]) -> Self {
-        let count = examples.len().max(1) as f64;
-        let mean = |i: usize| examples.iter().map(|(row, _)| row[i]).sum::<f64>() / count;
-        let center: Vec<f64> = (0..names.len()).map(mean).collect();
-        let spread = (0..names.len()).map(|i| {
-            let squares = examples.iter().map(|(row, _)| (row[i] - center[i]).powi(2)).sum::<f64>();
-            (squares / count).sqrt().max(1e-3)
-        });
-        let size = names.len() + 1;
-        let spread = spread.collect();
-        let mut fitted = Self {
-            features: names.iter().map(ToString::to_string).collect(),
-            spread,
-            center,
-            weights: vec![0.0; size],
-        };
-        for _ in 0..100 {
-            let mut curvature: DMatrix<f64> = DMatrix::identity(size, size);
-            curvature[(0, 0)] = 1e-6;
-            let mut gradient = DVector::from_fn(size, |i, _| -fitted.weights[i] * curvature[(i, i)]);
-            for (features, is) in examples {
-                let row = fitted.row(features);
-                let probability = fitted.probability(features);
-                for (i, x) in row.iter().enumerate() {
-                    gradient[i] += (f64::from(u8::from(*is)) - probability) * x;
-                    for (j, y) in row.iter().enumerate() {
-                        curvature[(i, j)] += probability * (1.0 - probability) * x * y;
-                    }
-                }
-            }
-            let Some(cholesky) = curvature.cholesky() else { break };
-            let step = cholesky.solve(&gradient);
-            let length = step.amax();
-            let step = if length > 2.0 { step * (2.0 / length) } else { step };
-            fitted.weights.iter_mut().zip(step.iter()).for_each(|(weight, step)| *weight += step);
-            if length < 1e-9 {
-                break;
-            }
-        }
-        fitted
-    }
 }
 
-/// Both regressions.
+/// All regressions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Decision {
     /// What it was made from.
@@ -199,45 +155,10 @@ impl Decision {
         self.widen.get(effect).or_else(|| self.widen.get("all")).copied().unwrap_or(1.0)
     }
 
-    /// Factors for which nine in ten of the values lie within, from how far off values were in halves of their intervals (split conformal prediction, Vovk et al.
-    /// 2005): by effect where there are enough of them.
-    #[must_use]
-    pub fn widths(off: &[(String, f64)]) -> BTreeMap<String, f64> {
-        /// Fewer do not tell the ninth of ten.
-        const ENOUGH: usize = 10;
-        let mut by: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        for (effect, off) in off.iter().filter(|(_, off)| off.is_finite()) {
-            by.entry(effect.clone()).or_default().push(*off);
-            by.entry("all".into()).or_default().push(*off);
-        }
-        by.retain(|_, off| off.len() >= ENOUGH);
-        let ninth = |mut off: Vec<f64>| {
-            off.sort_by(f64::total_cmp);
-            let place = (0.9 * (off.len() + 1) as f64).ceil() as usize;
-            off[place.min(off.len()) - 1].max(0.5)
-        };
-        by.into_iter().map(|(effect, off)| (effect, ninth(off))).collect()
-    }
-
     /// Probabilities of effect, none and unknown, with `best` that of the most probable effect.
     #[must_use]
     pub fn verdict(&self, best: f64, left: &Leftover) -> [f64; 3] {
         let missing = self.missing.probability(&log_features(left));
         [best, (1.0 - best) * (1.0 - missing), (1.0 - best) * missing]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_logistic_regression_finds_the_odds_of_two_groups() {
-        // 30 of 40 on one side, 10 of 40 on the other: odds of three and a third, less what the prior takes.
-        let example = |x: f64, yes: usize| (0..40).map(move |i| (vec![x], i < yes));
-        let examples: Vec<(Vec<f64>, bool)> = example(1.0, 30).chain(example(-1.0, 10)).collect();
-        let fitted = Logistic::learn(&["x"], &examples);
-        let (up, down) = (fitted.probability(&[1.0]), fitted.probability(&[-1.0]));
-        assert!((up - 0.75).abs() < 0.02 && (down - 0.25).abs() < 0.02, "{up} {down}");
     }
 }

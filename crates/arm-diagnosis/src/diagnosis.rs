@@ -187,8 +187,19 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
             joints: joints(&prepared, &found, &matrix, group, decision),
         })
         .collect();
+    let considered = all.iter().zip(&groups).map(|(effect, (probability, group))| Considered {
+        name: effect.name.to_owned(),
+        joints: effect.joints.iter().filter_map(|joint| joint.joint).collect(),
+        probability: *probability,
+        findings: group.findings,
+    });
+    let considered = considered.collect();
     let effects: Vec<NamedEffect> = all.iter().filter(|effect| effect.probability > 0.5).cloned().collect();
-    let mut diagnosis = Diagnosis {
+    let mut notes: Vec<String> = log.arm.notes().iter().chain(&log.notes).cloned().collect();
+    if !log.unread.is_empty() {
+        notes.push(format!("columns that nothing reads: {}", log.unread.join(", ")));
+    }
+    Some(Diagnosis {
         verdict,
         probabilities,
         effects,
@@ -198,22 +209,11 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
         heldout: held_out(&prepared, &found, verdict == Verdict::Effect),
         remainder: remainder(&prepared, &found),
         mass_uncertainty: found.mass_factor,
-        notes: log.arm.notes().iter().chain(&log.notes).cloned().collect(),
+        notes,
         leftover: left,
-        considered: groups.iter().map(|(probability, group)| considered(&found, *probability, group)).collect(),
+        considered,
         curves: curves(&prepared, &found),
-    };
-    if !log.unread.is_empty() {
-        diagnosis.notes.push(format!("columns that nothing reads: {}", log.unread.join(", ")));
-    }
-    Some(diagnosis)
-}
-
-fn considered(found: &Found, probability: f64, group: &Group) -> Considered {
-    let mut terms: Vec<_> = group.terms.iter().map(|place| &found.terms[*place]).collect();
-    terms.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let joints = terms.iter().filter_map(|term| found.catalogue.candidates[term.candidate].joint).collect();
-    Considered { name: group.effect.name.to_owned(), joints, probability, findings: group.findings }
+    })
 }
 
 fn joints(

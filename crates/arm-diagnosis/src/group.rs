@@ -140,6 +140,8 @@ struct Left {
     rows: Vec<usize>,
     /// White, for likelihoods.
     white: Vec<f64>,
+    /// Of all windows, joint after joint, N·m.
+    all: Vec<f64>,
 }
 
 fn left_over(prepared: &Prepared, found: &Found, fit: &Fit) -> Left {
@@ -151,7 +153,7 @@ fn left_over(prepared: &Prepared, found: &Found, fit: &Fit) -> Left {
         counts.push(count);
     }
     let white = found.design.whiten(None, &left, &found.design.held_out).values;
-    Left { squares, rows: counts, white }
+    Left { squares, rows: counts, white, all: left }
 }
 
 fn findings(prepared: &Prepared, found: &Found, terms: &[usize], without: &Fit, after: &Left) -> Findings {
@@ -194,14 +196,13 @@ fn findings(prepared: &Prepared, found: &Found, terms: &[usize], without: &Fit, 
 /// What the model of a log leaves.
 pub(crate) fn leftover(prepared: &Prepared, found: &Found) -> Leftover {
     let after = left_over(prepared, found, &found.fit);
-    let left = crate::search::left(&found.design.gap, &found.catalogue, &found.fit, prepared);
     let most = |of: &dyn Fn(usize) -> f64| (0..prepared.joints()).map(of).fold(0.0, f64::max);
     let mean = |joint: usize| after.squares[joint] / after.rows[joint].max(1) as f64;
     Leftover {
         // Noise that rounds to nothing would make anything large.
         after: most(&|joint| mean(joint) / prepared.noise[joint].max(1e-4 * prepared.scale[joint]).powi(2)),
         left: most(&|joint| mean(joint).sqrt() / prepared.scale[joint]),
-        foretold: most(&|joint| found.design.foretold(&left, joint, prepared)),
+        foretold: most(&|joint| found.design.foretold(&after.all, joint, prepared)),
     }
 }
 

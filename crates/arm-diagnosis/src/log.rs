@@ -36,6 +36,7 @@ pub struct Log {
     pub notes: Vec<String>,
 }
 
+/// The middle one, of an even number the upper of the two; NaN without values.
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -155,16 +156,7 @@ impl Log {
                 }
             }
         }
-        let mut steps: Vec<f64> = Vec::new();
-        for span in self.rows() {
-            steps.extend(self.time_secs[span].windows(2).map(|pair| pair[1] - pair[0]));
-        }
-        let step = median(steps);
-        let step = if step.is_nan() {
-            self.time_secs.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min)
-        } else {
-            step
-        };
+        let step = self.median_step();
         let stated = self.header.period_secs;
         if !(step > stated / 3.0 && step < stated * 3.0) {
             let problem = format!(
@@ -206,6 +198,17 @@ impl Log {
     #[must_use]
     pub fn joints(&self) -> usize {
         self.arm.joints().len()
+    }
+
+    /// Median time between rows of an episode, s; where no episode has two, the shortest between any.
+    pub(crate) fn median_step(&self) -> f64 {
+        let steps = |times: &[f64]| times.windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>();
+        let within: Vec<f64> = self.rows().flat_map(|rows| steps(&self.time_secs[rows])).collect();
+        if within.is_empty() {
+            steps(&self.time_secs).into_iter().fold(f64::INFINITY, f64::min)
+        } else {
+            median(within)
+        }
     }
 
     /// Rows of each episode.

@@ -6,7 +6,7 @@ use arm_dynamics::{Arm, Mass};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::log::Log;
+use crate::log::{Log, median};
 use crate::smooth::{Readings, Smooth};
 use crate::ticks::Ticks;
 
@@ -77,14 +77,14 @@ impl<'a> Prepared<'a> {
         let motion: Vec<Smooth> = (0..count)
             .into_par_iter()
             .map(|joint| {
-                let velocity = log.header.noise.joint_velocity_rps.clone();
+                let noise = &log.header.noise;
                 Readings {
                     spans: &spans,
                     time_secs: &ticks.time_secs,
                     position: &ticks.position[joint],
                     velocity: ticks.velocity.get(joint).map_or(&[], Vec::as_slice),
                 }
-                .smooth(known(&log.header.noise.joint_position_rad, joint), known(&velocity, joint))
+                .smooth(known(&noise.joint_position_rad, joint), known(&noise.joint_velocity_rps, joint))
             })
             .collect();
         let mut prepared = Self {
@@ -264,10 +264,8 @@ impl<'a> Prepared<'a> {
 
     /// Windows of each episode, and pieces of windows.
     fn cut(&mut self) {
-        let mut steps: Vec<f64> =
-            self.ticks.time_secs.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-        steps.sort_by(f64::total_cmp);
-        let step = steps.get(steps.len() / 2).copied().unwrap_or(WINDOW_SECS);
+        let steps = self.ticks.time_secs.windows(2).map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0);
+        let step = median(steps.collect());
         let long = (WINDOW_SECS / step).round().max(1.0) as usize;
         let spans: Vec<Range<usize>> = self.ticks.spans().collect();
         let mut piece = 0;
@@ -300,14 +298,12 @@ impl<'a> Prepared<'a> {
                 let read = match given {
                     Some(stddev) => stddev / (self.ticks.rows as f64).sqrt(),
                     None => {
-                        let mut squares: Vec<f64> = self.measured[joint]
-                            .windows(4)
+                        let thirds = self.measured[joint].windows(4);
+                        let squares = thirds
                             .map(|four| (four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]).powi(2) / 20.0)
-                            .filter(|square| square.is_finite())
-                            .collect();
-                        squares.sort_by(f64::total_cmp);
+                            .filter(|square| square.is_finite());
                         // The median of the square of a normal number is 0.455.
-                        (squares.get(squares.len() / 2).copied().unwrap_or(0.0) / 0.455).sqrt()
+                        (median(squares.collect()) / 0.455).sqrt()
                     }
                 };
                 (read / long.sqrt()).max(1e-9)

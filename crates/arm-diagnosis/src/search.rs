@@ -320,27 +320,21 @@ impl Found {
 
     /// Factors of torque as they were fitted.
     pub(crate) fn gains(&self, joints: usize) -> Vec<f64> {
-        let gain = |joint: usize| {
-            let own = |candidate: &&Candidate| {
-                candidate.joint == Some(joint) && ["torque_gain", "servo_gain"].contains(&candidate.effect.name)
-            };
-            let column = self.catalogue.candidates.iter().find(own).map(|candidate| candidate.features[0]);
-            let columns =
-                column.into_iter().flat_map(|column| [Some(column), self.catalogue.features[column].twin]).flatten();
-            (1.0 + columns.map(|column| coefficient(self, column)).sum::<f64>()).clamp(0.2, 5.0)
-        };
-        (0..joints).map(gain).collect()
+        let gain = |joint| 1.0 + self.value(&["torque_gain", "servo_gain"], Some(joint));
+        (0..joints).map(|joint| gain(joint).clamp(0.2, 5.0)).collect()
     }
 
     /// Delay of torques as it was fitted, s.
     pub(crate) fn delay_secs(&self) -> f64 {
-        let delay = self.catalogue.candidates.iter().find(|candidate| candidate.effect.name == "torque_delay");
-        let columns = delay.map(|delay| delay.features[0]).into_iter();
-        columns
-            .flat_map(|column| [Some(column), self.catalogue.features[column].twin])
-            .flatten()
-            .map(|column| coefficient(self, column))
-            .sum()
+        self.value(&["torque_delay"], None)
+    }
+
+    /// Fitted value of the first column of the first effect with one of these names, its nuisance's included; 0 where there is none.
+    fn value(&self, names: &[&str], joint: Option<usize>) -> f64 {
+        let own = |candidate: &&Candidate| candidate.joint == joint && names.contains(&candidate.effect.name);
+        let column = self.catalogue.candidates.iter().find(own).map(|candidate| candidate.features[0]);
+        let twin = column.and_then(|column| self.catalogue.features[column].twin);
+        column.into_iter().chain(twin).map(|column| coefficient(self, column)).sum()
     }
 }
 

@@ -3,6 +3,8 @@
 
 use nalgebra::{Matrix4, Vector4};
 
+use crate::log::median;
+
 /// A motion, a value a tick.
 #[derive(Debug, Default)]
 pub(crate) struct Smooth {
@@ -167,15 +169,10 @@ impl Readings<'_> {
                 accelerations.push(covariance[(2, 2)].max(0.0));
             }
         }
-        smooth.rate_stddev = middle(&mut rates).sqrt();
-        smooth.acceleration_stddev = middle(&mut accelerations).sqrt();
+        smooth.rate_stddev = median(rates).sqrt();
+        smooth.acceleration_stddev = median(accelerations).sqrt();
         smooth
     }
-}
-
-fn middle(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn transition(secs: f64) -> Matrix4<f64> {

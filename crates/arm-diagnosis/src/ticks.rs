@@ -23,12 +23,7 @@ pub(crate) struct Ticks {
 impl Ticks {
     pub(crate) fn new(log: &Log) -> Self {
         // By the log's own stamps: a period that is stated wrongly is not rare.
-        let mut steps: Vec<f64> = log
-            .rows()
-            .flat_map(|rows| log.time_secs[rows].windows(2).map(|pair| pair[1] - pair[0]).collect::<Vec<_>>())
-            .collect();
-        steps.sort_by(f64::total_cmp);
-        let period = steps.get(steps.len() / 2).copied().unwrap_or(log.header.period_secs);
+        let period = log.median_step();
         let rows = (TICK_SECS / period + 1e-6).floor().max(1.0) as usize;
         let groups: Vec<Vec<std::ops::Range<usize>>> = log
             .rows()

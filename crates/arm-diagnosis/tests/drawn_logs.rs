@@ -291,6 +291,28 @@ fn exchanged(samples: &str, a: &str, b: &str) -> String {
 }
 
 #[test]
+fn currents_stand_for_torques_by_their_constants() {
+    let folder = tempfile::tempdir().unwrap();
+    write_log(folder.path(), &|_, _, _, _| vec![0.0; JOINTS]);
+    let (toml, csv) = (folder.path().join("log.toml"), folder.path().join("samples.csv"));
+    let torque = Log::read(folder.path()).unwrap().torque;
+    let mut samples = std::fs::read_to_string(&csv).unwrap();
+    for joint in 0..JOINTS {
+        let (kind, unit) = if joint == 2 { ("force", "n") } else { ("torque", "nm") };
+        samples = samples.replacen(&format!("joint_{kind}_{joint}_{unit}"), &format!("joint_current_{joint}_a"), 1);
+    }
+    std::fs::write(&csv, samples).unwrap();
+    let message = Log::read(folder.path()).unwrap_err().to_string();
+    assert!(message.contains("expected gear.torque_constant_nmpa in log.toml"), "{message}");
+    let header = std::fs::read_to_string(&toml).unwrap();
+    std::fs::write(&toml, format!("{header}[gear]\ntorque_constant_nmpa = [3, 1, 1, 1, 1, 1, 1, 0.5]\n")).unwrap();
+    let found = Log::read(folder.path()).unwrap().torque;
+    for (joint, constant) in [(0, 3.0), (4, 1.0), (7, 0.5)] {
+        assert!(found[joint].iter().zip(&torque[joint]).all(|(found, own)| *found == constant * own), "{joint}");
+    }
+}
+
+#[test]
 fn a_log_that_is_broken_is_refused_with_file_and_place() {
     let folder = tempfile::tempdir().unwrap();
     write_log(folder.path(), &|_, _, _, _| vec![0.0; JOINTS]);

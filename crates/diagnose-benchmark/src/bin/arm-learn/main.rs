@@ -1,5 +1,6 @@
 //! `cargo xtask arm-learn`: how the diagnosis of arms decides, made from simulated logs of several engines, and judged on the engine that was left out.
 
+mod learn;
 mod score;
 mod truth;
 
@@ -8,15 +9,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
-use arm_diagnosis::{
-    Considered, Decision, EFFECT_FEATURES, FORM_FEATURES, LOG_FEATURES, Leftover, Log, Logistic, Settings,
-    diagnose_with, effect_features, form_features, log_features,
-};
+use arm_diagnosis::{Considered, Decision, Leftover, Log, Settings, diagnose_with};
 use clap::Parser;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use whole_file::Existing;
 
+use learn::learn;
 use score::table;
 use truth::{Truth, off, read_truths};
 
@@ -153,31 +152,4 @@ fn answer(log: &Log, truth: &Truth) -> Option<Answer> {
         confusion_set: diagnosis.confusion_set,
         off,
     })
-}
-
-/// All regressions from some logs.
-fn learn<'a>(cases: impl Iterator<Item = &'a Case> + Clone, learnt_from: Vec<String>) -> Decision {
-    let effects = cases.clone().flat_map(|case| {
-        let left = &case.answer.leftover;
-        case.answer.considered.iter().map(move |one| (effect_features(&one.findings, left), case.truth.is_kin(one)))
-    });
-    let cases_with_friction = cases.clone().filter(|case| case.truth.is_friction());
-    let cases_found = cases.clone();
-    let right = Logistic::learn(&EFFECT_FEATURES, &effects.collect::<Vec<_>>());
-    // Where the right effect was found nothing can be learnt about others; and what does not show is nothing.
-    let logs = cases
-        .filter(|case| case.truth.is_none() || case.truth.is_outside())
-        .filter(|case| case.truth.is_none() || case.truth.shows());
-    let missing = logs.map(|case| (log_features(&case.answer.leftover), case.truth.is_outside()));
-    let forms = cases_with_friction.flat_map(|case| {
-        let left = &case.answer.leftover;
-        let kin = case.answer.considered.iter().filter(|one| case.truth.is_kin(one));
-        kin.map(move |one| (form_features(&one.findings, &one.name, left), case.truth.is(one)))
-    });
-    let form = Logistic::learn(&FORM_FEATURES, &forms.collect::<Vec<_>>());
-    let off: Vec<(String, f64)> = cases_found
-        .flat_map(|case| case.answer.off.values().map(|off| (case.truth.effect.clone(), off.abs())).collect::<Vec<_>>())
-        .collect();
-    let widen = Decision::widths(&off);
-    Decision { learnt_from, right, form, widen, missing: Logistic::learn(&LOG_FEATURES, &missing.collect::<Vec<_>>()) }
 }
