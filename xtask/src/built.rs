@@ -17,7 +17,7 @@ pub(crate) const BUILT: &str = "SURMISE_BUILT";
 /// The package of a program.
 fn package(binary: &str) -> &str {
     match binary {
-        "train" | "calibrate" => "prior-training",
+        "train" | "calibrate" | "posterior-data" => "prior-training",
         "eval" => "experiments",
         "demo" => "report",
         "record-log" | "diagnose-learn" | "arm-learn" => "diagnose-benchmark",

@@ -9,7 +9,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Try it", &["doctor", "demo", "report", "rerun"]),
     ("Plan: how often does it succeed?", &["eval", "scenario"]),
     ("Diagnose a log of a robot", &["import-log", "record-log", "log", "robot", "diagnose"]),
-    ("Train a prior", &["datagen", "train", "calibrate"]),
+    ("Train a prior", &["datagen", "train", "calibrate", "posterior-data"]),
     ("Measure the project itself", &["bench", "diagnose-benchmark", "diagnose-learn", "arm-learn"]),
     ("Develop", &["docs", "ci", "completions"]),
 ];

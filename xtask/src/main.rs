@@ -28,6 +28,9 @@ enum Verb {
     /// Trains the prior.
     #[command(disable_help_flag = true)]
     Train(Rest),
+    /// Writes a dataset as arrays for training/posterior.py.
+    #[command(disable_help_flag = true)]
+    PosteriorData(Rest),
     /// Compares what the prior says of held-out episodes with the truth.
     #[command(disable_help_flag = true)]
     Calibrate(Rest),
@@ -106,6 +109,7 @@ fn main() -> ExitCode {
     let result = match verb {
         Verb::Datagen(rest) => become_program("datagen", &rest.arguments),
         Verb::Train(rest) => become_program("train", &rest.arguments),
+        Verb::PosteriorData(rest) => become_program("posterior-data", &rest.arguments),
         Verb::Calibrate(rest) => become_program("calibrate", &rest.arguments),
         Verb::Eval(rest) => become_program("eval", &rest.arguments),
         Verb::Demo(rest) => become_program("demo", &rest.arguments),

@@ -1,20 +1,19 @@
 //! Algorithm 1, and who plays it.
 
 use pomdp::{Outcome, Seed};
-use prior::Suggester;
 use scenario::{Filter, Problem};
 
 use crate::controller::{Update, controller};
 use crate::episode_log::EpisodeLog;
 use crate::record::End;
-use crate::{Episode, Error, Method, Watcher, World};
+use crate::{Episode, Error, Method, Network, Watcher, World};
 
 /// Plays episodes of a problem with one method.
 #[derive(Debug)]
 pub struct Agent<'a> {
     problem: &'a Problem,
     method: Method,
-    prior: Option<Suggester>,
+    prior: Option<Network>,
 }
 
 impl<'a> Agent<'a> {
@@ -23,8 +22,8 @@ impl<'a> Agent<'a> {
     /// # Errors
     ///
     /// [`Error::NoPrior`] where the method needs one and none is given; [`Error::NoDensity`] where the filter could not weigh what it
-    /// suggests.
-    pub fn new(problem: &'a Problem, method: Method, prior: Option<&Suggester>) -> Result<Self, Error> {
+    /// suggests; [`Error::OtherNetwork`] where it is of another kind.
+    pub fn new(problem: &'a Problem, method: Method, prior: Option<&Network>) -> Result<Self, Error> {
         if method.needs_prior() && prior.is_none() {
             return Err(Error::NoPrior { method: method.name() });
         }
@@ -36,8 +35,14 @@ impl<'a> Agent<'a> {
             (Method::Mixture, Filter::Rejection) => return Err(Error::NoWeights { method: method.name() }),
             _ => {}
         }
-        let prior = if method.needs_prior() { prior.cloned() } else { None };
-        Ok(Self { problem, method, prior })
+        let prior = prior.filter(|_| method.needs_prior());
+        match (prior, filter) {
+            (Some(Network::Suggester(_)), Filter::Bridge) | (Some(Network::Posterior(_)), Filter::Rejection) => {
+                return Err(Error::OtherNetwork { filter: filter.name() });
+            }
+            _ => {}
+        }
+        Ok(Self { problem, method, prior: prior.cloned() })
     }
 
     /// Plays one episode. `seed` is the trial's own seed.

@@ -9,12 +9,11 @@ mod searcher;
 use belief::Particles;
 use planner::SearchReport;
 use pomdp::{Policy, Seed, UpdateReport};
-use prior::Suggester;
 use push_task::{Action, GoalPolicy, HeuristicPolicy, Observation, Particle, PushModel};
 use scenario::{Filter, Problem, Rollouts};
 
 use crate::record::End;
-use crate::{Error, Method, WorldStep};
+use crate::{Error, Method, Network, WorldStep};
 use bridge::BridgeController;
 pub use bridge::history;
 use heuristic::HeuristicController;
@@ -79,7 +78,7 @@ pub(crate) trait Controller {
 pub(crate) fn controller<'a>(
     problem: &'a Problem,
     method: Method,
-    prior: Option<&'a mut Suggester>,
+    prior: Option<&'a mut Network>,
     first: (&Observation, &[f64]),
     seed: Seed,
 ) -> Result<Box<dyn Controller + 'a>, Error> {
@@ -88,8 +87,13 @@ pub(crate) fn controller<'a>(
         Method::Oracle => Box::new(OracleController::new(problem, seed)?),
         Method::NoRnn | Method::RnnMax | Method::RnnSampling | Method::Mixture => {
             match problem.scenario.belief.filter {
-                Filter::Rejection => Box::new(RejectionController::new(problem, method, prior, first.0, seed)?),
-                Filter::Bridge => Box::new(BridgeController::new(problem, prior, first.0, seed)?),
+                Filter::Rejection => {
+                    let prior = prior.and_then(Network::suggester);
+                    Box::new(RejectionController::new(problem, method, prior, first.0, seed)?)
+                }
+                Filter::Bridge => {
+                    Box::new(BridgeController::new(problem, prior.and_then(Network::posterior), first, seed)?)
+                }
             }
         }
     })

@@ -29,6 +29,12 @@ pub enum Error {
         /// Method.
         method: &'static str,
     },
+    /// The filters ask for different networks.
+    #[error("belief.filter = \"{filter}\" needs another kind of network than the one given")]
+    OtherNetwork {
+        /// Filter.
+        filter: &'static str,
+    },
     /// The rejection filter has no weights.
     #[error(
         "method {method} does not go with belief.filter = \"rejection\", which cannot weigh suggestions: use rnn-sampling"

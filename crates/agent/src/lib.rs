@@ -30,6 +30,7 @@ mod episode_log;
 mod error;
 mod external;
 mod method;
+mod network;
 mod proposals;
 mod record;
 mod teacher;
@@ -44,6 +45,7 @@ pub use external::{
     ExternalEpisode, ExternalWorld, LINE_LIMIT_BYTES, PROTOCOL, Timeouts, WorldAddress, WorldError, WorldIdentity,
 };
 pub use method::Method;
+pub use network::Network;
 pub use record::{Episode, Reason, StepRecord};
 pub use teacher::Estimate;
 pub use watch::{StepView, Watcher};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use agent::{Agent, Error, Method, Reason, SimulatedWorld, World, WorldStep};
+use agent::{Agent, Error, Method, Network, Reason, SimulatedWorld, World, WorldStep};
 use pomdp::{Outcome, Purpose, Seed};
 use push_task::{Action, Observation, Particle};
 use scenario::{Problem, Selection, find_root};
@@ -82,8 +82,7 @@ fn the_bridge_filter_keeps_the_belief_through_an_episode_within_its_transitions(
 fn the_network_brings_an_unknown_obstacle_into_the_bridge_filter() {
     let problem = preset("surmise", "obstacle", &["planner.budget={transitions=60}", "task.horizon=4"]);
     let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
-    let folder = root.join("assets/priors/sawyer-fixed");
-    let network = prior::Suggester::load(&folder, "sawyer", &problem.model).unwrap();
+    let network = Network::load(&root.join("assets/priors/sawyer-fixed"), &problem).unwrap();
     let shares = |method, network| {
         let mut agent = Agent::new(&problem, method, network).unwrap();
         let episode = agent.run(&mut world(&problem, Seed(5)), Seed(5)).unwrap();
@@ -102,12 +101,14 @@ fn a_method_that_needs_a_prior_says_so() {
         assert!(matches!(Agent::new(&problem, method, None), Err(Error::NoPrior { .. })), "{method:?}");
     }
     let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
-    let prior = prior::Suggester::load(&root.join("assets/priors/sawyer"), "sawyer", &problem.model).unwrap();
+    let prior = Network::load(&root.join("assets/priors/sawyer"), &problem).unwrap();
     let bridge = self::problem("D1", &["belief.filter=\"bridge\""]);
     let unweighted = Agent::new(&problem, Method::Mixture, Some(&prior));
     assert!(matches!(unweighted, Err(Error::NoWeights { .. })), "the filter has no weights");
     let refused = Agent::new(&bridge, Method::RnnSampling, Some(&prior));
     assert!(matches!(refused, Err(Error::NoDensity { .. })), "the filter needs the density of what is suggested");
+    let refused = Agent::new(&bridge, Method::Mixture, Some(&prior));
+    assert!(matches!(refused, Err(Error::OtherNetwork { .. })), "the filter asks what the episode began with");
 }
 
 /// A world whose object jumps by half a metre: nothing in any belief explains that.

@@ -4,38 +4,43 @@ use std::path::Path;
 
 use agent::Estimate;
 use physics_model::theta::NO_OBSTACLE;
-use pomdp::{Outcome, Policy as _, Prior as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
-use prior::Suggester;
+use pomdp::{Outcome, Policy as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
+use prior::PosteriorNetwork;
 use push_task::{HeuristicPolicy, History, Particle};
 use scenario::{Problem, Selection, find_root};
 
 fn problem(domain: &str) -> Problem {
+    problem_with(domain, &[])
+}
+
+fn problem_with(domain: &str, set: &[&str]) -> Problem {
     let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
-    let selection = Selection { domain: domain.into(), ..Selection::new(&root) };
+    let set = set.iter().map(ToString::to_string).collect();
+    let selection = Selection { domain: domain.into(), preset: "surmise".into(), set, ..Selection::new(&root) };
     Problem::assemble(&selection.load().unwrap(), &root).unwrap()
 }
 
 /// The shipped network for obstacles that cannot move.
-fn network(problem: &Problem) -> Suggester {
+fn network(problem: &Problem) -> PosteriorNetwork {
     let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
-    Suggester::load(&root.join("assets/priors/sawyer-fixed"), "sawyer", &problem.model).unwrap()
+    PosteriorNetwork::load(&root.join("assets/priors/sawyer-fixed"), "sawyer", &problem.model).unwrap()
 }
 
 /// An episode of `actions` pushes towards the object, and the network after it.
-fn episode<'a>(problem: &'a Problem, actions: usize, item: u64) -> (History<'a>, Suggester) {
+fn episode<'a>(problem: &'a Problem, actions: usize, item: u64) -> (History<'a>, PosteriorNetwork) {
     let seed = Seed(31 + item);
     let mut network = network(problem);
     let mut world = problem.sample_world(&mut seed.stream(Purpose::World, 0)).unwrap();
     let mut rng = seed.stream(Purpose::Truth, 0);
     let first = problem.truth.initial_observation(&mut world, &mut rng);
     network.reset();
-    network.suggest(None, &first);
+    network.observe(&problem.model, None, &first, &world.state.joints_rad);
     let mut history = agent::history(problem, Some(&network), &first);
     for _ in 0..actions {
         let action = HeuristicPolicy.action(&problem.truth, &world, &mut rng);
         let (step, _) = problem.truth.act(&mut world, action, &mut rng);
         assert_eq!(step.outcome, Outcome::Continue);
-        network.suggest(Some(&action), &step.observation);
+        network.observe(&problem.model, Some(action), &step.observation, &world.state.joints_rad);
         history.push(action, &step.observation, &world.state.joints_rad);
     }
     (history, network)
@@ -48,25 +53,23 @@ fn mean_and_error(values: &[f64]) -> (f64, f64) {
     (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt())
 }
 
-/// A possible start from a draw, with ln p of the first measured height.
-fn start(history: &History<'_>, estimate: &Estimate<'_>, rng: &mut Rng) -> Option<(Particle, f64)> {
+/// A possible start from a draw, with ln of the estimate's density over the prior's, and ln p of the first measured height.
+fn start(history: &History<'_>, estimate: &Estimate<'_>, rng: &mut Rng) -> Option<(Particle, f64, f64)> {
     let (classes, z) = estimate.draw(rng)?;
-    history.start(&classes, &z)
+    let (start, log) = history.start(&classes, &z)?;
+    Some((start, estimate.log_ratio(&classes, &z), log))
 }
 
 #[test]
 fn a_number_that_is_known_exactly_leaves_the_prior() {
-    let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
-    let set = vec!["distribution.object.friction.stddev=0.0".into()];
-    let selection = Selection { domain: "D4".into(), set, ..Selection::new(&root) };
-    let problem = Problem::assemble(&selection.load().unwrap(), &root).unwrap();
+    let problem = problem_with("D4", &["distribution.object.friction.stddev=0.0"]);
     let (history, network) = episode(&problem, 2, 0);
     let estimate = Estimate::network(&history, &network);
     let mut rng = Seed(44).stream(Purpose::Test, 0);
     let starts: Vec<_> = (0..40).filter_map(|_| start(&history, &estimate, &mut rng)).collect();
     assert!(starts.len() > 10, "{} of 40 are possible", starts.len());
-    for (start, _) in starts {
-        assert_eq!((start.theta.object.friction, estimate.log_ratio(&start)), (0.4, 0.0));
+    for (start, log_ratio, _) in starts {
+        assert_eq!((start.theta.object.friction, log_ratio), (0.4, 0.0));
     }
 }
 
@@ -74,16 +77,15 @@ fn a_number_that_is_known_exactly_leaves_the_prior() {
 fn the_density_of_draws_is_normalised() {
     // E over q of p / q is the mass of p, whatever q is. p is the prior times the likelihood of the first measured height, as the network has
     // seen it: so the ratio varies little. The mass of p is found by draws of the prior. Draws that are no world count as 0 on both sides.
-    for domain in ["D4", "D1"] {
-        let problem = problem(domain);
+    let heavier = ["distribution.object.mass_kg.mean=0.6", "distribution.object.friction.mean=0.45"];
+    for (domain, set) in [("D4", [].as_slice()), ("D1", &[]), ("D4", &heavier)] {
+        let problem = problem_with(domain, set);
         for item in 0..2 {
             let (history, network) = episode(&problem, 0, item);
             let mut rng = Seed(41).stream(Purpose::Test, item);
             let mut mass = |estimate: &Estimate<'_>| {
-                let value = |_| {
-                    start(&history, estimate, &mut rng)
-                        .map_or(0.0, |(start, log)| (log - estimate.log_ratio(&start)).exp())
-                };
+                let value =
+                    |_| start(&history, estimate, &mut rng).map_or(0.0, |(_, log_ratio, log)| (log - log_ratio).exp());
                 mean_and_error(&(0..6000).map(value).collect::<Vec<_>>())
             };
             let (expected, expected_error) = mass(&Estimate::prior(&history));
@@ -101,27 +103,29 @@ fn the_density_of_draws_is_normalised() {
 
 #[test]
 fn draws_follow_the_density() {
-    // E over q of p / q = 1 for a density p that is q shifted a little: in mass, which has no limits.
+    // E over q of q(z shifted) / q(z) = 1, for every coordinate that a box and an obstacle that is a box have.
     let problem = problem("D4");
     for item in 0..2 {
         let (history, network) = episode(&problem, 4, item);
-        let estimate = Estimate::network(&history, &network);
-        let coordinates = history.start_coordinates();
-        let log_density = |start: &Particle| estimate.log_ratio(start) + coordinates.log_density(start);
+        let density = network.density().unwrap();
         let mut rng = Seed(42).stream(Purpose::Test, item);
-        for shift in [0.95, 1.05] {
-            let mut ratios = Vec::new();
-            while ratios.len() < 3000 {
-                let Some((start, _)) = start(&history, &estimate, &mut rng) else { continue };
-                let mut shifted = start.clone();
-                shifted.theta.object.mass_kg *= shift;
-                ratios.push((log_density(&shifted) - log_density(&start)).exp());
-            }
-            let (mean, error) = mean_and_error(&ratios);
-            println!("{mean} ± {error}");
-            assert!((mean - 1.0).abs() < 4.0 * error, "{mean} ± {error}");
-            assert!(error < 0.02, "{error}");
+        let log_density = |z: &[f64]| density.log_ratio(0, z) - 0.5 * z.iter().map(|z| z * z).sum::<f64>();
+        for coordinate in 0..18 {
+            // A twentieth of the spread of what the network says of it.
+            let draws: Vec<_> = (0..3000).map(|_| density.draw(0, &mut rng)).collect();
+            let mean = draws.iter().map(|z| z[coordinate]).sum::<f64>() / 3000.0;
+            let stddev = (draws.iter().map(|z| (z[coordinate] - mean).powi(2)).sum::<f64>() / 3000.0).sqrt();
+            let ratios = draws.iter().map(|z| {
+                let mut shifted = *z;
+                shifted[coordinate] += 0.05 * stddev;
+                (log_density(&shifted) - log_density(z)).exp()
+            });
+            let (mean, error) = mean_and_error(&ratios.collect::<Vec<_>>());
+            println!("{coordinate}: {mean} ± {error}, spread {stddev}");
+            assert!((mean - 1.0).abs() < 4.5 * error, "{coordinate}: {mean} ± {error}");
+            assert!(error < 0.02, "{coordinate}: {error}");
         }
+        assert_eq!(history.coordinates(), 18);
     }
 }
 
@@ -132,40 +136,30 @@ fn draws_have_the_classes_of_the_domain() {
         let (history, network) = episode(&problem, 0, 0);
         let estimate = Estimate::network(&history, &network);
         let mut rng = Seed(43).stream(Purpose::Test, 0);
-        let classes = || (0..3).flat_map(|shape| (0..=NO_OBSTACLE).map(move |obstacle| [shape, obstacle]));
         // Corrected probabilities of classes by Bayes: the network's over the training data's frequencies, times the domain's.
         let (shapes, obstacles) = history.start_coordinates().class_probabilities();
-        let ratio = |[shape, obstacle]: [usize; 2]| {
-            shapes[shape] * obstacles[obstacle] / network.class_frequency([shape, obstacle])
-        };
-        let total: f64 = classes().map(|c| network.class_probability(c) * ratio(c)).sum();
-        // Of the network's draws of a class a share lies within the limits of the domain: that share is met by the teacher.
+        let trained = network.distribution();
+        let said = network.density().unwrap().pairs();
+        let corrected: Vec<f64> = (0..12)
+            .map(|pair| {
+                let (shape, obstacle) = (pair / (NO_OBSTACLE + 1), pair % (NO_OBSTACLE + 1));
+                let there = trained.object.shape[shape] * trained.obstacle.shape[obstacle];
+                said[pair] * shapes[shape] * obstacles[obstacle] / there
+            })
+            .collect();
+        let total: f64 = corrected.iter().sum();
         let n = 8000;
-        let table_m = problem.model.config().world.table_height_m;
-        let mut raw = [[0.0_f64; NO_OBSTACLE + 1]; 3];
-        let mut drawn = raw;
-        let mut z = vec![0.0; history.coordinates()];
+        let mut drawn = [0.0; 12];
         for _ in 0..n {
-            let particle = network.sample_raw(table_m, &mut rng).unwrap();
-            if history.start_coordinates().invert(&particle, &mut z).is_some() {
-                let [shape, obstacle] = particle.theta.classes();
-                raw[shape][obstacle] += 1.0 / f64::from(n);
-            }
-            if let Some((classes, _)) = estimate.draw(&mut rng) {
-                drawn[classes[0]][classes[1]] += 1.0 / f64::from(n);
-            }
+            let (classes, _) = estimate.draw(&mut rng).unwrap();
+            drawn[classes[0] * (NO_OBSTACLE + 1) + classes[1]] += 1.0 / f64::from(n);
         }
-        println!("{domain}: {} of the network's draws are possible", raw.iter().flatten().sum::<f64>());
-        for class in classes() {
-            let [shape, obstacle] = class;
-            let factor = ratio(class) / total;
-            let (found, expected) = (drawn[shape][obstacle], raw[shape][obstacle] * factor);
-            // Null: both are shares of n draws. Four standard errors, and a count for what is rare.
-            let variance = (found + factor * expected) / f64::from(n);
-            let tolerance = 4.0 * variance.sqrt() + 4.0 * factor.max(1.0) / f64::from(n);
-            println!("{class:?}: {found:.4} for {expected:.4} ± {tolerance:.4}");
-            assert!((found - expected).abs() < tolerance, "{domain} {class:?}: {found} {expected} ± {tolerance}");
-            assert!(factor > 0.0 || found == 0.0, "{domain} {class:?} does not occur");
+        for (pair, found) in drawn.into_iter().enumerate() {
+            let expected = corrected[pair] / total;
+            // Null: a share of n draws. Four standard errors, and a count for what is rare.
+            let tolerance = 4.0 * (expected / f64::from(n)).sqrt() + 4.0 / f64::from(n);
+            assert!((found - expected).abs() < tolerance, "{domain}, {pair}: {found} {expected} ± {tolerance}");
+            assert!(expected > 0.0 || found == 0.0, "{domain}: {pair} does not occur");
         }
     }
 }
@@ -184,7 +178,7 @@ fn the_ratio_of_every_draw_is_finite_and_no_draw_has_an_obstacle_where_there_is_
                 assert!(z.len() == history.coordinates() && z.iter().all(|z| z.is_finite()));
                 let Some((start, _)) = history.start(&classes, &z) else { continue };
                 assert_eq!(start.theta.classes().to_vec(), classes);
-                let log_ratio = estimate.log_ratio(&start);
+                let log_ratio = estimate.log_ratio(&classes, &z);
                 assert!(log_ratio.is_finite(), "{log_ratio}: {start:?}");
                 possible += 1;
             }

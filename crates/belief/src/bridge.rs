@@ -55,11 +55,10 @@ impl BridgeConfig {
     }
 }
 
-/// A hypothesis with its start and ln ratio of each remembered teacher over the prior.
+/// A hypothesis with ln ratio of each remembered teacher over the prior.
 #[derive(Clone, Debug)]
 struct Member<S> {
     hypothesis: Hypothesis<S>,
-    start: S,
     ratios: VecDeque<f64>,
 }
 
@@ -88,7 +87,7 @@ pub struct BridgeFilter<S, T> {
     log_evidence: f64,
 }
 
-impl<S: Clone + Send + Sync, T: Teacher<S>> BridgeFilter<S, T> {
+impl<S: Clone + Send + Sync, T: Teacher> BridgeFilter<S, T> {
     /// A filter of an episode that has just begun, with what its teacher says before the first step.
     ///
     /// # Errors
@@ -172,24 +171,26 @@ impl<S: Clone + Send + Sync, T: Teacher<S>> BridgeFilter<S, T> {
         let made = each(self.config.draws, rng, |_, rng| {
             for attempts in 1..=ATTEMPTS {
                 let Some((classes, start)) = teacher.draw(rng) else { continue };
-                let Some((state, _)) = episode.start(&classes, &start) else { continue };
+                if episode.start(&classes, &start).is_none() {
+                    continue;
+                }
                 let count = episode.steps() * episode.step_coordinates();
                 let noise = (0..count).map(|_| normal(rng)).collect();
-                return (attempts, Some((state, replay(episode, (classes, start, noise), 1.0, f64::NEG_INFINITY))));
+                return (attempts, Some(replay(episode, (classes, start, noise), 1.0, f64::NEG_INFINITY)));
             }
             (ATTEMPTS, None)
         });
         // Impossible draws count: that they are replaced by possible ones makes the density of these larger by as much.
         let drawn = made.iter().map(|(attempts, _)| attempts).sum();
         let (mut transitions, mut members) = (0, Vec::new());
-        for (start, replayed) in made.into_iter().filter_map(|(_, made)| made) {
+        for replayed in made.into_iter().filter_map(|(_, made)| made) {
             transitions += replayed.transitions;
             let Some(hypothesis) = replayed.hypothesis else { continue };
-            let ratios = self.batches.iter().map(|batch| batch.teacher.log_ratio(&start)).collect();
-            members.push(Member { hypothesis, start, ratios });
+            let ratios = self.batches.iter().map(|batch| hypothesis.log_ratio(&batch.teacher)).collect();
+            members.push(Member { hypothesis, ratios });
         }
         for member in self.batches.iter_mut().flat_map(|batch| &mut batch.members).chain(&mut members) {
-            member.ratios.push_back(teacher.log_ratio(&member.start));
+            member.ratios.push_back(member.hypothesis.log_ratio(&teacher));
         }
         self.batches.push_back(Batch { teacher, drawn, members });
         transitions

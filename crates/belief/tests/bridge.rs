@@ -66,7 +66,7 @@ impl Guess {
     }
 }
 
-impl Teacher<State> for Guess {
+impl Teacher for Guess {
     fn draw(&self, rng: &mut Rng) -> Option<(Vec<usize>, Vec<f64>)> {
         let class = usize::from(rng.random::<f64>() < self.second.0);
         if rng.random::<f64>() < self.impossible {
@@ -75,9 +75,9 @@ impl Teacher<State> for Guess {
         Some((vec![class], self.parts[class].draw(rng)))
     }
 
-    fn log_ratio(&self, start: &State) -> f64 {
-        let class = usize::from(start.height != 0.0);
-        let z = [start.x, start.slope, start.height / HEIGHT];
+    fn log_ratio(&self, classes: &[usize], start: &[f64]) -> f64 {
+        let class = classes[0];
+        let z = [start[0], start[1], if class == 1 { start[2] } else { 0.0 }];
         let probability = |second: f64| if class == 1 { second } else { 1.0 - second };
         let prior: f64 = z[..2 + class].iter().map(|z| log_gaussian(*z, 1.0)).sum();
         let class_ratio = probability(self.second.0) / probability(self.second.1);
@@ -353,12 +353,12 @@ fn results_are_the_same_for_any_number_of_threads() {
 #[derive(Clone)]
 struct Mute;
 
-impl Teacher<State> for Mute {
+impl Teacher for Mute {
     fn draw(&self, _rng: &mut Rng) -> Option<(Vec<usize>, Vec<f64>)> {
         None
     }
 
-    fn log_ratio(&self, _start: &State) -> f64 {
+    fn log_ratio(&self, _: &[usize], _: &[f64]) -> f64 {
         f64::NEG_INFINITY
     }
 }

@@ -10,8 +10,8 @@ mod table;
 
 use std::path::{Path, PathBuf};
 
+use agent::Network;
 use anyhow::{Context as _, Result, ensure};
-use prior::Suggester;
 use rayon::prelude::*;
 use scenario::{Problem, Selection};
 use serde_json::{Value, json};
@@ -62,8 +62,8 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     }
     let scenario = selection.load()?;
     let problem = Problem::assemble(&scenario, root)?;
-    let folder = task.prior.clone().unwrap_or_else(|| prior::default_folder(root, &scenario.prior_names(), task.quick));
-    let network = Suggester::load(&folder, &scenario.robot.name, &problem.model)?;
+    let folder = task.prior.clone().unwrap_or_else(|| Network::default_folder(root, &problem, task.quick));
+    let network = Network::load(&folder, &problem)?;
     let identity = json!({
         "scenario": scenario, "seed": task.seed, "network": network.hash(),
     });

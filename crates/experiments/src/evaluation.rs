@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use agent::{Agent, Method, Timeouts, WorldAddress};
-use prior::Suggester;
+use agent::{Agent, Method, Network, Timeouts, WorldAddress};
 use scenario::{Filter, Problem, Published, Scenario, Selection};
 
 use crate::files::check_claim;
@@ -33,7 +32,7 @@ pub struct Request {
 pub struct Evaluation {
     pub(crate) scenario: Scenario,
     pub(crate) problem: Arc<Problem>,
-    pub(crate) prior: Option<Suggester>,
+    pub(crate) prior: Option<Network>,
     prior_folder: Option<PathBuf>,
     pub(crate) worlds: Option<Worlds>,
     /// Whether all trials share one world behind a socket.
@@ -55,10 +54,10 @@ impl Evaluation {
         }
         let methods = methods(&request.methods, scenario.belief.filter);
         let problem = Arc::new(Problem::assemble(&scenario, root)?);
-        let default = || prior::default_folder(root, &scenario.prior_names(), request.selection.quick);
+        let default = || Network::default_folder(root, &problem, request.selection.quick);
         let needs_prior = methods.iter().any(|method| method.needs_prior());
         let prior_folder = needs_prior.then(|| request.prior.clone().unwrap_or_else(default));
-        let load = |folder: &PathBuf| Suggester::load(folder, &scenario.robot.name, &problem.model);
+        let load = |folder: &PathBuf| Network::load(folder, &problem);
         let prior = prior_folder.as_ref().map(load).transpose()?;
         // What a method cannot do is said before a folder is made.
         for method in &methods {

@@ -1,8 +1,7 @@
 //! One trial: a drawn world, one method.
 
-use agent::{Agent, BeliefErrors, Episode, Method, Reason, SimulatedWorld, Watcher};
+use agent::{Agent, BeliefErrors, Episode, Method, Network, Reason, SimulatedWorld, Watcher};
 use pomdp::{Purpose, Seed};
-use prior::Suggester;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +65,7 @@ pub struct TrialRecord {
 pub fn play(
     problem: &Problem,
     method: Method,
-    prior: Option<&Suggester>,
+    prior: Option<&Network>,
     root: Seed,
     trial: u32,
 ) -> Result<(TrialRecord, Episode), Error> {
@@ -81,7 +80,7 @@ pub fn play(
 pub fn play_watched(
     problem: &Problem,
     method: Method,
-    prior: Option<&Suggester>,
+    prior: Option<&Network>,
     root: Seed,
     trial: u32,
     watcher: &mut dyn Watcher,
@@ -109,7 +108,7 @@ pub fn play_watched(
 pub fn play_external(
     problem: &Problem,
     method: Method,
-    prior: Option<&Suggester>,
+    prior: Option<&Network>,
     root: Seed,
     trial: u32,
     worlds: &Worlds,

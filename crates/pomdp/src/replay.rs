@@ -52,11 +52,12 @@ pub trait Replay: Sync {
     }
 }
 
-/// An outside estimate of the posterior given the whole history so far, such as a network that was trained on complete episodes.
-pub trait Teacher<S>: Sync {
-    /// Classes and coordinates of a start, drawn from the estimate; `None` where a draw is impossible.
+/// An outside estimate of the posterior given the whole history so far, such as a network that was trained on complete episodes. A start is
+/// that of a [`Replay`]: a class of each factor, and coordinates.
+pub trait Teacher: Sync {
+    /// A start drawn from the estimate; `None` where a draw is impossible.
     fn draw(&self, rng: &mut Rng) -> Option<(Vec<usize>, Vec<f64>)>;
 
     /// ln of the density of the estimate over that of the prior, at a start.
-    fn log_ratio(&self, start: &S) -> f64;
+    fn log_ratio(&self, classes: &[usize], coordinates: &[f64]) -> f64;
 }

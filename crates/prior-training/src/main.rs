@@ -161,7 +161,8 @@ fn suggest_next(robot: &str, root: &Path, out: &Path) {
     next.push((command(&["calibrate", "--robot", robot, "--prior", &prior]), "compares it with them"));
     // An arm of a file is called by the file, whose path is not known here.
     if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
-        let words = ["eval", "--domain", "D4", "--robot", robot, "--prior", &prior, "--trials", "10"];
+        let words =
+            ["eval", "--domain", "D4", "--preset", "paper", "--robot", robot, "--prior", &prior, "--trials", "10"];
         next.push((command(&words), "plays with it"));
     }
     program::next(&next);

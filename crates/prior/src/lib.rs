@@ -26,7 +26,7 @@
 //! - **One factor per target** scales the stated spread, fitted on the held-out part ([`TrainConfig::rescale`]): a
 //!   network that fits its training data well is overconfident. Calibration is measured on other data, from another
 //!   seed.
-//! - **Suggestions as proposals** ([`density`]): their density in plain coordinates, for importance weights.
+//! - **What an episode began with** ([`posterior`]) is another question, and another network's.
 //!
 //! # Example
 //!
@@ -75,7 +75,6 @@
 
 pub mod calibrate;
 pub mod checkpoint;
-pub mod density;
 pub mod error;
 pub mod features;
 mod files;
@@ -86,6 +85,7 @@ pub mod mixture;
 pub mod normalise;
 pub mod parameters;
 pub mod pictures;
+pub mod posterior;
 pub mod settings;
 pub mod suggest;
 pub mod train;
@@ -99,25 +99,20 @@ pub use layout::{ClassTarget, Layout, Sequence, Transform};
 pub use mixture::{Draw, Mixture};
 pub use normalise::Normalisation;
 pub use parameters::{Dimensions, NetworkConfig, Parameters};
+pub use posterior::PosteriorNetwork;
 pub use settings::{EpochReport, Schedule, TrainConfig};
 pub use suggest::Suggester;
 
 pub use train::{Trainer, curve_csv, is_held_out};
 
-/// The default network of a program, whose folder has one of `names`, the best one first. With `quick`, what was trained quickly comes before all
-/// others. Else a better name comes before a worse one, and for each name what was trained here before what is shipped: a network of your own for
-/// all mobilities of the obstacle does not replace the shipped one for the mobility at hand.
+/// The default network of a program, in a folder `name` that holds `file`. With `quick`, what was trained quickly comes first, then what was trained
+/// here, then what is shipped.
 #[must_use]
-pub fn default_folder(root: &std::path::Path, names: &[impl AsRef<str>], quick: bool) -> std::path::PathBuf {
-    let folder = |place: &str, name: &str| root.join(place).join(name);
-    let quick = names.iter().filter(|_| quick).map(|name| folder("runs/quick/priors", name.as_ref()));
-    let places = ["runs/priors", "assets/priors"];
-    let full = names.iter().flat_map(|name| places.map(|place| folder(place, name.as_ref())));
-    let last = names.last().map_or("", AsRef::as_ref);
-    quick
-        .chain(full)
-        .find(|folder| folder.join(checkpoint::FILE).is_file())
-        .unwrap_or_else(|| folder("assets/priors", last))
+pub fn default_folder(root: &std::path::Path, name: &str, file: &str, quick: bool) -> std::path::PathBuf {
+    let shipped = root.join("assets/priors").join(name);
+    let own = [("runs/quick/priors", quick), ("runs/priors", true)];
+    let mut own = own.into_iter().filter(|(_, asked)| *asked).map(|(place, _)| root.join(place).join(name));
+    own.find(|folder| folder.join(file).is_file()).unwrap_or(shipped)
 }
 
 /// The project folder that a command line names, or the nearest one at or above `start`, else `start`. The programs that train need no

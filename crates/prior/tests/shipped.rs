@@ -2,20 +2,7 @@
 
 use std::path::Path;
 
-use prior::features::ActionInput;
 use prior::{Calibration, Checkpoint};
-
-#[test]
-fn the_networks_of_the_bridge_filter_load_and_know_the_actions() {
-    for name in ["sawyer-fixed", "sawyer-movable"] {
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/priors").join(name);
-        let checkpoint = Checkpoint::load(&folder, None).unwrap();
-        assert_eq!(checkpoint.layout.robot, "sawyer");
-        assert!(checkpoint.network.memory);
-        assert_eq!(ActionInput::of(&checkpoint.layout), ActionInput::OneHot);
-        assert!(folder.join("curve.png").is_file(), "{name}");
-    }
-}
 
 #[test]
 fn every_shipped_prior_loads_and_its_report_holds() {

@@ -5,9 +5,11 @@
 //! included. All structures share the coordinates: what a shape does not use sleeps, and keeps its distribution (Godsill, "On the
 //! relationship between Markov chain Monte Carlo methods for model uncertainty", JCGS 10(2), 2001). So a change of shape needs no Jacobian.
 
-use physics_model::config::ObstacleMobility;
 use physics_model::state::BodyState;
 use physics_model::theta::{NO_OBSTACLE, ObjectShape, ObjectTheta, ObstacleTheta, Theta, standard_com_m};
+use pomdp::Rng;
+use rand::RngExt as _;
+use rand_distr::{Distribution as _, StandardNormal};
 use statrs::distribution::{ContinuousCDF as _, Gamma, Normal};
 use statrs::function::gamma::ln_gamma;
 
@@ -21,8 +23,53 @@ use crate::state::State;
 pub const OBJECT: std::ops::Range<usize> = 0..11;
 /// Coordinates of the obstacle: mass, sizes (3), x, y, yaw.
 pub const OBSTACLE: std::ops::Range<usize> = 11..18;
-/// First coordinate of unknown parameters of effects.
-const EFFECTS: usize = 18;
+/// Number of coordinates of object and obstacle. Those of unknown parameters of effects follow.
+pub const START: usize = 18;
+
+/// Whether the shapes of object and obstacle do not use a coordinate of the first [`START`].
+#[must_use]
+pub fn sleeps((shape, obstacle): (ObjectShape, Option<ObjectShape>), coordinate: usize) -> bool {
+    match coordinate {
+        // The frame of a sphere is turned so that its centre of mass lies below its centre.
+        2 | 3 => shape == ObjectShape::Sphere,
+        5..8 => coordinate - 5 >= shape.size_count(),
+        11..START => {
+            obstacle.is_none_or(|shape| (12..15).contains(&coordinate) && coordinate - 12 >= shape.size_count())
+        }
+        _ => false,
+    }
+}
+
+/// Distribution of what one coordinate stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Part<'a> {
+    Normal(&'a TruncatedNormal),
+    Mass(&'a GammaMean),
+}
+
+impl Part<'_> {
+    fn value(self, z: f64) -> f64 {
+        match self {
+            Self::Normal(normal) => self::normal(normal, z),
+            Self::Mass(gamma) => mass(gamma, z),
+        }
+    }
+
+    /// `None` outside its limits.
+    fn coordinate(self, value: f64) -> Option<f64> {
+        match self {
+            Self::Normal(normal) => coordinate(normal, value),
+            Self::Mass(gamma) => mass_coordinate(gamma, value),
+        }
+    }
+
+    fn log_density(self, value: f64) -> f64 {
+        match self {
+            Self::Normal(normal) => normal.log_density(value),
+            Self::Mass(gamma) => log_mass_density(gamma, value),
+        }
+    }
+}
 
 /// The prior of an episode that began with an observation, as a function of standard normal coordinates.
 #[derive(Clone, Debug)]
@@ -31,8 +78,7 @@ pub struct Coordinates<'a> {
     /// The distribution, with the object's pose given the first measurement of it.
     prior: WorldDistribution,
     joints_rad: Vec<f64>,
-    /// Measured height of the object's centre, m.
-    height_m: f64,
+    first: Observation,
 }
 
 impl<'a> Coordinates<'a> {
@@ -52,7 +98,7 @@ impl<'a> Coordinates<'a> {
         object.y_m = given(&object.y_m, position[1], noise.position_m);
         let yaw = BodyState { orientation, ..BodyState::at_rest(position, 0.0) }.yaw_rad();
         object.yaw_rad = given(&object.yaw_rad, yaw, noise.orientation_rad);
-        Self { model, prior, joints_rad: joints_rad.to_vec(), height_m: first.object_pose().0[2] }
+        Self { model, prior, joints_rad: joints_rad.to_vec(), first: first.clone() }
     }
 
     /// The model.
@@ -70,7 +116,7 @@ impl<'a> Coordinates<'a> {
     /// Number of coordinates.
     #[must_use]
     pub fn count(&self) -> usize {
-        EFFECTS + effects::count(&self.prior.effects)
+        START + effects::count(&self.prior.effects)
     }
 
     /// The hypothesis of these shapes at `z`, and ln p of the first measured height; `None` where it is no possible world.
@@ -105,7 +151,7 @@ impl<'a> Coordinates<'a> {
         let theta = Theta {
             object: ObjectTheta { shape, mass_kg, com_m, friction, size_m },
             obstacle: obstacle_theta,
-            effects: effects::at(&self.prior.effects, z[EFFECTS..].iter().map(|z| uniform(*z))),
+            effects: effects::at(&self.prior.effects, z[START..].iter().map(|z| uniform(*z))),
         };
         let state = State { joints_rad: self.joints_rad.clone(), object, obstacle: obstacle_state };
         let mut particle = Particle::new(state, theta);
@@ -115,41 +161,60 @@ impl<'a> Coordinates<'a> {
         self.model.displace(&mut particle);
         self.model.check(&particle).ok()?;
         let stddev = self.model.config().sensor.noise.position_m;
-        let error_m = self.height_m - self.model.readings(&particle).object.position_m[2];
+        let error_m = self.first.object_pose().0[2] - self.model.readings(&particle).object.position_m[2];
         Some((particle, gaussian(error_m, stddev)))
     }
 }
 
 impl Coordinates<'_> {
-    /// ln of the prior's density at a start, over shapes, ln masses, friction and sizes, and the place (x, y, yaw) of an obstacle that cannot
-    /// move: what a network can say of it. Centre of mass and the object's pose are left out. So are the mass of what cannot move, and the
-    /// place of what can: a network says where it is now, which need not be where it was. −∞ outside the distribution.
+    /// The same episode with another distribution of worlds.
     #[must_use]
-    pub fn log_density(&self, start: &Particle) -> f64 {
-        let (d, b) = (&self.prior.object, &self.prior.obstacle);
-        let theta = &start.theta;
-        let [shape, obstacle] = theta.classes();
-        let parts = |sizes: &SizeDistribution, shape: ObjectShape, size_m: [f64; 3]| -> f64 {
-            sizes.parts_of(shape).iter().zip(size_m).map(|(part, size)| part.log_density(size)).sum()
-        };
-        let object = &theta.object;
-        let mut total = d.shape[shape].ln() + b.shape[obstacle].ln();
-        total += log_mass_density(&d.mass_kg, object.mass_kg) + d.friction.log_density(object.friction);
-        total += parts(&d.size_m, object.shape, object.size_m);
-        if let (Some(o), Some(body)) = (&theta.obstacle, &start.state.obstacle) {
-            total += parts(&b.size_m, o.shape, o.size_m);
-            total += match self.model.config().world.obstacle_mobility {
-                ObstacleMobility::Movable => log_mass_density(&b.mass_kg, o.mass_kg),
-                ObstacleMobility::Fixed => {
-                    let [x, y, _] = body.position_m;
-                    b.x_m.log_density(x) + b.y_m.log_density(y) + b.yaw_rad.log_density(body.yaw_rad())
-                }
-            };
-        }
-        total
+    pub fn with_distribution(&self, distribution: &WorldDistribution) -> Self {
+        Self::new(self.model, distribution, &self.joints_rad, &self.first)
     }
 
-    /// Whether [`Self::log_density`] is a density: none of the numbers that it counts is known exactly.
+    /// Coordinates here of what has the coordinates `z` in `other`, and Σ ln (density there / density here) of the numbers behind them.
+    /// Coordinates of the same distribution stay. `None` where the start lies outside the distribution here.
+    #[must_use]
+    pub fn translated(
+        &self,
+        other: &Self,
+        shapes: (ObjectShape, Option<ObjectShape>),
+        z: &[f64],
+    ) -> Option<(Vec<f64>, f64)> {
+        let (mut own, mut log_ratio) = (z.to_vec(), 0.0);
+        for (index, z) in own.iter_mut().enumerate().take(START).filter(|(index, _)| !sleeps(shapes, *index)) {
+            let (here, there) = (self.part(shapes, index), other.part(shapes, index));
+            if here != there {
+                let value = there.value(*z);
+                *z = here.coordinate(value)?;
+                log_ratio += there.log_density(value) - here.log_density(value);
+            }
+        }
+        Some((own, log_ratio))
+    }
+
+    /// What an awake coordinate of the first [`START`] stands for. That of a centre of mass is before its limits.
+    fn part(&self, (shape, obstacle): (ObjectShape, Option<ObjectShape>), index: usize) -> Part<'_> {
+        let (d, b) = (&self.prior.object, &self.prior.obstacle);
+        let of_obstacle = || b.size_m.parts_of(obstacle.expect("an obstacle that is none has no awake coordinate"));
+        match index {
+            0 => Part::Mass(&d.mass_kg),
+            1 => Part::Normal(&d.friction),
+            2..5 => Part::Normal(&d.com_m[index - 2]),
+            5..8 => Part::Normal(&d.size_m.parts_of(shape)[index - 5]),
+            8 => Part::Normal(&d.x_m),
+            9 => Part::Normal(&d.y_m),
+            10 => Part::Normal(&d.yaw_rad),
+            11 => Part::Mass(&b.mass_kg),
+            12..15 => Part::Normal(&of_obstacle()[index - 12]),
+            15 => Part::Normal(&b.x_m),
+            16 => Part::Normal(&b.y_m),
+            _ => Part::Normal(&b.yaw_rad),
+        }
+    }
+
+    /// Whether no number of a start but the centre of mass and the object's pose is known exactly.
     #[must_use]
     pub fn has_density(&self) -> bool {
         let (d, b) = (&self.prior.object, &self.prior.obstacle);
@@ -159,32 +224,46 @@ impl Coordinates<'_> {
         d.size_m.parts().chain([&d.friction]).chain(of_obstacle).all(|part| part.stddev > 0.0)
     }
 
-    /// Coordinates of what [`Self::log_density`] counts, into `z`; the others stay. `None` outside the distribution.
+    /// All coordinates of a start: the inverse of [`Self::start`]. What a start does not show is drawn from its prior given what it shows: where the
+    /// centre of mass met its limit, which of two signs, and what its shapes do not use. `None` outside the distribution.
     #[must_use]
-    pub fn invert(&self, start: &Particle, z: &mut [f64]) -> Option<()> {
-        let (d, b) = (&self.prior.object, &self.prior.obstacle);
-        let object = &start.theta.object;
-        z[0] = mass_coordinate(&d.mass_kg, object.mass_kg)?;
-        z[1] = coordinate(&d.friction, object.friction)?;
-        for (i, part) in d.size_m.parts_of(object.shape).iter().enumerate() {
-            z[5 + i] = coordinate(part, object.size_m[i])?;
-        }
-        if let (Some(o), Some(body)) = (&start.theta.obstacle, &start.state.obstacle) {
-            let z = &mut z[OBSTACLE];
-            for (i, part) in b.size_m.parts_of(o.shape).iter().enumerate() {
-                z[1 + i] = coordinate(part, o.size_m[i])?;
+    pub fn of(&self, start: &Particle, rng: &mut Rng) -> Option<Vec<f64>> {
+        let (object, body) = (&start.theta.object, &start.state.object);
+        let obstacle = start.theta.obstacle.as_ref().zip(start.state.obstacle.as_ref());
+        let shapes = (object.shape, obstacle.map(|(theta, _)| theta.shape));
+        let half_m = object.shape.half_extents_m(object.size_m);
+        let sign = if object.shape == ObjectShape::Sphere && rng.random::<bool>() { -1.0 } else { 1.0 };
+        let mut z: Vec<f64> = (0..self.count()).map(|_| StandardNormal.sample(rng)).collect();
+        for index in (0..START).filter(|index| !sleeps(shapes, *index)) {
+            let part = self.part(shapes, index);
+            let of_obstacle = |value: &dyn Fn(&ObstacleTheta, &BodyState) -> f64| {
+                obstacle.map_or(f64::NAN, |(theta, body)| value(theta, body))
+            };
+            let value = match index {
+                0 => object.mass_kg,
+                1 => object.friction,
+                2..5 => sign * object.com_m[index - 2],
+                5..8 => object.size_m[index - 5],
+                8 | 9 => body.position_m[index - 8],
+                10 => body.yaw_rad(),
+                11 => of_obstacle(&|theta, _| theta.mass_kg),
+                12..15 => of_obstacle(&|theta, _| theta.size_m[index - 12]),
+                15 | 16 => of_obstacle(&|_, body| body.position_m[index - 15]),
+                _ => of_obstacle(&|_, body| body.yaw_rad()),
+            };
+            z[index] = part.coordinate(value)?;
+            if (2..5).contains(&index) && value.abs() >= half_m[index - 2] / 2.0 {
+                z[index] = cut_off(z[index], value > 0.0, rng);
             }
-            match self.model.config().world.obstacle_mobility {
-                ObstacleMobility::Movable => z[0] = mass_coordinate(&b.mass_kg, o.mass_kg)?,
-                ObstacleMobility::Fixed => {
-                    z[4] = coordinate(&b.x_m, body.position_m[0])?;
-                    z[5] = coordinate(&b.y_m, body.position_m[1])?;
-                    z[6] = coordinate(&b.yaw_rad, body.yaw_rad())?;
-                }
-            }
         }
-        Some(())
+        Some(z)
     }
+}
+
+/// z of a value that was cut at a limit, drawn from what was cut off above or below `z`.
+fn cut_off(z: f64, above: bool, rng: &mut Rng) -> f64 {
+    let (low, high) = if above { (uniform(z), 1.0) } else { (0.0, uniform(z)) };
+    standard_quantile(low + (high - low) * rng.random::<f64>())
 }
 
 /// ln of the density of ln mass.

@@ -225,18 +225,26 @@ impl PushModel {
 
     /// Observation before the first action: no contact force yet.
     pub fn initial_observation(&self, particle: &mut Particle, rng: &mut Rng) -> Observation {
-        let tool = self.tool_pose(&particle.state.joints_rad);
+        let own = self.own_effects(&particle.theta);
+        let effects = Effects::new(own.as_deref().unwrap_or(&self.effects));
+        particle.force = self.resting(effects, &particle.state.joints_rad);
+        self.config.sensor.observe(&self.readings(particle), rng)
+    }
+
+    /// Noise-free force readings of an arm that stands still without contact (see [`Readings::force`]).
+    #[must_use]
+    pub fn resting_force(&self, joints_rad: &[f64]) -> [f64; 6] {
+        self.resting(Effects::new(&self.effects), joints_rad)
+    }
+
+    fn resting(&self, effects: Effects, joints_rad: &[f64]) -> [f64; 6] {
         let moment = ToolMoment {
             time_secs: 0.0,
-            orientation: tool.orientation,
+            orientation: self.tool_pose(joints_rad).orientation,
             acceleration_mps2: [0.0; 3],
             gravity_mps2: self.config.world.gravity_mps2,
         };
-        let own = self.own_effects(&particle.theta);
-        let effects = Effects::new(own.as_deref().unwrap_or(&self.effects));
-        let sensor = &self.config.sensor;
-        particle.force = resting_reading(&self.robot, sensor, effects, &particle.state.joints_rad, &moment);
-        self.config.sensor.observe(&self.readings(particle), rng)
+        resting_reading(&self.robot, &self.config.sensor, effects, joints_rad, &moment)
     }
 
     /// One action, in place, with a report of what happened. The observation, reward and outcome are those of

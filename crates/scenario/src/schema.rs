@@ -88,6 +88,17 @@ pub enum Filter {
     Bridge,
 }
 
+impl Filter {
+    /// Name in scenarios.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rejection => "rejection",
+            Self::Bridge => "bridge",
+        }
+    }
+}
+
 /// Filters of the belief. All have settings; `filter` says which one runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -101,18 +112,18 @@ pub struct BeliefConfig {
 }
 
 impl Scenario {
-    /// Names of the folders that hold a network for this scenario, the best one first. The bridge filter's are trained on worlds with the transition's
-    /// noise and one mobility of the obstacle.
+    /// Name of the folder of the network for this scenario. The bridge filter's are trained on worlds with the transition's noise and one mobility of
+    /// the obstacle.
     #[must_use]
-    pub fn prior_names(&self) -> Vec<String> {
+    pub fn prior_name(&self) -> String {
         let robot = &self.robot.name;
         let mobility = match self.world.obstacle_mobility {
             ObstacleMobility::Fixed => "fixed",
             ObstacleMobility::Movable => "movable",
         };
         match self.belief.filter {
-            Filter::Rejection => vec![robot.clone()],
-            Filter::Bridge => vec![format!("{robot}-{mobility}"), robot.clone()],
+            Filter::Rejection => robot.clone(),
+            Filter::Bridge => format!("{robot}-{mobility}"),
         }
     }
 }

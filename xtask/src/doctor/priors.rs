@@ -7,36 +7,43 @@ use serde_json::Value;
 use super::probe::ask;
 use super::{Check, State};
 
-/// Folders below `assets/priors`: of the rejection filter, and of the bridge filter.
-const SHIPPED: [&str; 4] = ["sawyer", "jaco", "sawyer-fixed", "sawyer-movable"];
+/// Folders below `assets/priors` with the file that names the weights: of the rejection filter, and of the bridge filter.
+const SHIPPED: [(&str, &str); 6] = [
+    ("sawyer", "prior.json"),
+    ("jaco", "prior.json"),
+    ("sawyer-fixed", "posterior.json"),
+    ("sawyer-movable", "posterior.json"),
+    ("jaco-fixed", "posterior.json"),
+    ("jaco-movable", "posterior.json"),
+];
 
 pub(crate) fn checks(root: &Path) -> Vec<Check> {
-    let of = |name: &str| {
+    let of = |(name, file): (&str, &str)| {
         let remedy = format!("git checkout -- assets/priors/{name}; git lfs pull where it is a pointer");
-        let found = prior(root, &format!("assets/priors/{name}"));
+        let found = prior(root, &format!("assets/priors/{name}"), file);
         Check::new(&format!("prior of {name}"), found, "eval with the network's suggestions", remedy).required()
     };
     SHIPPED.map(of).into()
 }
 
-fn prior(root: &Path, folder: &str) -> Result<String, (State, String)> {
+fn prior(root: &Path, folder: &str, file: &str) -> Result<String, (State, String)> {
     let broken = |problem: String| (State::Broken, problem);
-    let head = root.join(folder).join("prior.json");
-    let text = std::fs::read_to_string(&head).map_err(|_| (State::Missing, format!("no {folder}/prior.json")))?;
+    let head = root.join(folder).join(file);
+    let text = std::fs::read_to_string(&head).map_err(|_| (State::Missing, format!("no {folder}/{file}")))?;
     let head: Value = serde_json::from_str(&text)
-        .map_err(|error| broken(format!("prior.json: {}", whole_file::plain(&error.to_string()))))?;
+        .map_err(|error| broken(format!("{file}: {}", whole_file::plain(&error.to_string()))))?;
     let (Some(name), Some(bytes)) = (head["weights"]["name"].as_str(), head["weights"]["bytes"].as_u64()) else {
-        return Err(broken("prior.json names no weights".into()));
+        return Err(broken(format!("{file} names no weights")));
     };
-    let file = root.join(folder).join(name);
-    let found = std::fs::metadata(&file).map_err(|_| (State::Missing, format!("no {name}")))?.len();
+    let found =
+        std::fs::metadata(root.join(folder).join(name)).map_err(|_| (State::Missing, format!("no {name}")))?.len();
     if found != bytes {
         return Err(broken(format!("{name} has {found} bytes, expected {bytes}")));
     }
     as_committed(root, &format!("{folder}/{name}"))
 }
 
-/// Git hashes the content: the hash in `prior.json` would need a library that a menu has no other use for. `eval` checks that one.
+/// Git hashes the content: the hash in the JSON file would need a library that a menu has no other use for. `eval` checks that one.
 fn as_committed(root: &Path, path: &str) -> Result<String, (State, String)> {
     let folder = root.display().to_string();
     let git = |arguments: &[&str]| ask("git", &[&["-C", &folder], arguments].concat()).ok();

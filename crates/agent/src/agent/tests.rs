@@ -3,6 +3,7 @@ use std::path::Path;
 use belief::Particles;
 use physics_model::ObjectShape;
 use pomdp::{Outcome, Prior as _, Proposals, Purpose, Updater as _};
+use prior::Suggester;
 use push_task::Action;
 use scenario::{Selection, find_root};
 
@@ -77,6 +78,7 @@ fn suggestions_are_possible_worlds_that_agree_with_the_measurement() {
 #[test]
 fn suggestions_join_the_belief_and_bring_an_unknown_obstacle_into_it() {
     let (problem, prior) = problem("obstacle", &["planner.budget={transitions=60}", "task.horizon=6"]);
+    let prior = Network::Suggester(Box::new(prior));
     let play = |method, prior| {
         let mut agent = Agent::new(&problem, method, prior).unwrap();
         agent.run(&mut world(&problem, Seed(5)), Seed(5)).unwrap()

@@ -1,8 +1,8 @@
 //! The method with a belief over whole histories: the network's estimate, and the exact likelihood as far as its draws carry it.
 
 use belief::{BridgeFilter, Particles};
-use pomdp::{Prior as _, Purpose, Rng, Seed};
-use prior::Suggester;
+use pomdp::{Purpose, Rng, Seed};
+use prior::PosteriorNetwork;
 use push_task::{Action, Coordinates, History, Observation, Particle};
 use scenario::{InitialObstacle, Problem};
 
@@ -12,10 +12,11 @@ use crate::{Error, Estimate, WorldStep};
 
 /// Searches from a belief over whole histories.
 pub(crate) struct BridgeController<'a> {
+    problem: &'a Problem,
     searcher: Searcher<'a>,
     history: History<'a>,
     filter: BridgeFilter<Particle, Estimate<'a>>,
-    prior: Option<&'a mut Suggester>,
+    prior: Option<&'a mut PosteriorNetwork>,
     /// `None` once it is out of particles.
     belief: Option<Particles<Particle>>,
     rng: Rng,
@@ -26,35 +27,35 @@ impl<'a> BridgeController<'a> {
     /// one.
     pub(crate) fn new(
         problem: &'a Problem,
-        mut prior: Option<&'a mut Suggester>,
-        first: &Observation,
+        mut prior: Option<&'a mut PosteriorNetwork>,
+        first: (&Observation, &[f64]),
         seed: Seed,
     ) -> Result<Self, Error> {
         if let Some(network) = &mut prior {
             network.reset();
-            network.suggest(None, first);
+            network.observe(&problem.model, None, first.0, first.1);
         }
-        let history = history(problem, prior.as_deref(), first);
+        let history = history(problem, prior.as_deref(), first.0);
         let mut rng = seed.stream(Purpose::Filter, 0);
         let estimate = estimate(&history, prior.as_deref());
         let filter = BridgeFilter::new(problem.scenario.belief.bridge.clone(), &history, estimate, &mut rng)?;
         let belief = Some(filter.belief()?);
-        Ok(Self { searcher: Searcher::new(problem, seed)?, history, filter, prior, belief, rng })
+        Ok(Self { problem, searcher: Searcher::new(problem, seed)?, history, filter, prior, belief, rng })
     }
 }
 
 /// An episode that began with `first`. What a network has learnt of obstacles is its own prior where the scenario's first belief has none.
 #[must_use]
-pub fn history<'a>(problem: &'a Problem, prior: Option<&Suggester>, first: &Observation) -> History<'a> {
+pub fn history<'a>(problem: &'a Problem, prior: Option<&PosteriorNetwork>, first: &Observation) -> History<'a> {
     let mut distribution = problem.beliefs.clone();
     if let (InitialObstacle::None, Some(network)) = (problem.scenario.initial_belief.obstacle, prior) {
-        distribution.obstacle.shape = network.obstacle_frequencies();
+        distribution.obstacle.shape = network.distribution().obstacle.shape;
     }
     History::new(Coordinates::new(&problem.model, &distribution, &problem.start_joints_rad, first))
 }
 
 /// What the network says, or the prior.
-fn estimate<'a>(history: &History<'a>, prior: Option<&Suggester>) -> Estimate<'a> {
+fn estimate<'a>(history: &History<'a>, prior: Option<&PosteriorNetwork>) -> Estimate<'a> {
     prior.map_or_else(|| Estimate::prior(history), |network| Estimate::network(history, network))
 }
 
@@ -67,7 +68,7 @@ impl Controller for BridgeController<'_> {
     fn update(&mut self, action: Action, answer: &WorldStep) -> Result<Update, Error> {
         self.history.push(action, &answer.observation, &answer.joints_rad);
         if let Some(network) = &mut self.prior {
-            network.suggest(Some(&action), &answer.observation);
+            network.observe(&self.problem.model, Some(action), &answer.observation, &answer.joints_rad);
         }
         let estimate = estimate(&self.history, self.prior.as_deref());
         match self.filter.update(&self.history, estimate, &mut self.rng) {

@@ -1,6 +1,6 @@
 //! A hypothesis about a whole episode.
 
-use pomdp::{Replay, Rng};
+use pomdp::{Replay, Rng, Teacher};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 
@@ -56,6 +56,11 @@ impl<S> Hypothesis<S> {
     pub(crate) fn log_likelihood(&self, exponent: f64) -> f64 {
         let (last, before) = self.logs.split_last().expect("there is what was seen before the first step");
         before.iter().sum::<f64>() + if exponent == 0.0 { 0.0 } else { exponent * last }
+    }
+
+    /// What a teacher says of its start.
+    pub(crate) fn log_ratio(&self, teacher: &impl Teacher) -> f64 {
+        teacher.log_ratio(&self.classes, &self.start)
     }
 
     /// Leads the hypothesis through one more step.

@@ -1,10 +1,9 @@
 //! One world: an episode, and what each source says of it at each step.
 
-use agent::{Agent, Estimate, Method, SimulatedWorld, StepView, Watcher};
-use anyhow::Result;
+use agent::{Agent, Estimate, Method, Network, SimulatedWorld, StepView, Watcher};
+use anyhow::{Result, bail};
 use belief::Particles;
-use pomdp::{Belief as _, Prior as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
-use prior::Suggester;
+use pomdp::{Belief as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
 use push_task::{Action, Observation, Particle};
 use rand::RngExt as _;
 use scenario::Problem;
@@ -77,7 +76,7 @@ pub struct World {
 struct Onlooker {
     truth: Option<Particle>,
     rows: Vec<Row>,
-    steps: Vec<(Action, Observation)>,
+    steps: Vec<(Action, Observation, Vec<f64>)>,
     transitions: Vec<usize>,
     exponents: Vec<f64>,
     rng: Rng,
@@ -90,7 +89,7 @@ impl Watcher for Onlooker {
         let Some(belief) = view.belief else { return };
         self.rows.push(row(belief, truth, &mut self.rng));
         if let Some(step) = view.step {
-            self.steps.push((step.action, step.observation.clone()));
+            self.steps.push((step.action, step.observation.clone(), truth.state.joints_rad.clone()));
             if let Some(update) = &step.update {
                 self.transitions.push(update.transitions);
                 self.exponents.push(update.temperature);
@@ -100,7 +99,7 @@ impl Watcher for Onlooker {
 }
 
 /// Plays world `number`.
-pub(super) fn play(problem: &Problem, network: &Suggester, root: Seed, number: u32) -> Result<World> {
+pub(super) fn play(problem: &Problem, network: &Network, root: Seed, number: u32) -> Result<World> {
     let seed = root.child(Purpose::World, u64::from(number));
     let start = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
     let has_obstacle = start.theta.obstacle.is_some();
@@ -121,9 +120,10 @@ pub(super) fn play(problem: &Problem, network: &Suggester, root: Seed, number: u
     let seconds = started.elapsed().as_secs_f64() / episode.steps.len().max(1) as f64;
 
     let mut rng = seed.stream(Purpose::Statistics, 1);
+    let Network::Posterior(network) = network else { bail!("expected the network of a bridge filter") };
     let mut network = network.clone();
     network.reset();
-    network.suggest(None, &observation);
+    network.observe(&problem.model, None, &observation, &start.state.joints_rad);
     let history = agent::history(problem, Some(&network), &observation);
     let prior = Estimate::prior(&history);
     let mut draws = |estimate: &Estimate<'_>| -> Result<Row> {
@@ -135,8 +135,8 @@ pub(super) fn play(problem: &Problem, network: &Suggester, root: Seed, number: u
         Ok(row(&belief, &start, &mut rng))
     };
     let (mut of_prior, mut of_network) = (vec![draws(&prior)?], vec![draws(&Estimate::network(&history, &network))?]);
-    for (action, observation) in &onlooker.steps {
-        network.suggest(Some(action), observation);
+    for (action, observation, joints_rad) in &onlooker.steps {
+        network.observe(&problem.model, Some(*action), observation, joints_rad);
         of_prior.push(draws(&prior)?);
         of_network.push(draws(&Estimate::network(&history, &network))?);
     }

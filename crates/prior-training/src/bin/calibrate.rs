@@ -61,7 +61,8 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<()> {
     let root = prior::project_root(arguments.root.as_deref(), &std::env::current_dir()?)?;
     let robot = &arguments.robot;
-    let folder = arguments.prior.clone().unwrap_or_else(|| prior::default_folder(&root, &[robot], false));
+    let folder =
+        arguments.prior.clone().unwrap_or_else(|| prior::default_folder(&root, robot, prior::checkpoint::FILE, false));
     let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(robot));
     let out = arguments.out.clone().unwrap_or_else(|| folder.clone());
     check_out(&out)?;

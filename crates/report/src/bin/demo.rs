@@ -3,12 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use agent::Method;
+use agent::{Method, Network};
 use anyhow::{Context as _, Result};
 use clap::Parser;
 use experiments::{TrialRecord, play_watched};
 use pomdp::Seed;
-use prior::Suggester;
 use program::{Failed, typed};
 use recording::{EpisodeTrace, Moment};
 use report::{Observer, describe, episode_figure, episode_film, episode_page};
@@ -92,9 +91,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         scenario::Filter::Bridge => Method::Mixture,
         scenario::Filter::Rejection => Method::RnnSampling,
     });
-    let default = || prior::default_folder(&root, &scenario.prior_names(), arguments.quick);
+    let default = || Network::default_folder(&root, &problem, arguments.quick);
     let folder = method.needs_prior().then(|| arguments.prior.clone().unwrap_or_else(default));
-    let prior = folder.map(|folder| Suggester::load(&folder, &scenario.robot.name, &problem.model)).transpose()?;
+    let prior = folder.map(|folder| Network::load(&folder, &problem)).transpose()?;
     // What the method cannot do is said before a folder is made.
     agent::Agent::new(&problem, method, prior.as_ref())?;
     let out = arguments.out.clone().unwrap_or_else(|| {
@@ -165,7 +164,7 @@ struct Game<'a> {
     scenario: &'a Scenario,
     problem: &'a Problem,
     method: Method,
-    prior: Option<&'a Suggester>,
+    prior: Option<&'a Network>,
 }
 
 impl Game<'_> {

@@ -1,0 +1,154 @@
+//! `cargo xtask posterior-data`: a dataset as plain arrays, which `training/posterior.py` trains the posterior network on.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context as _, Result, bail, ensure};
+use clap::Parser;
+use dataset::{Episode, Reader};
+use physics_model::Theta;
+use physics_model::config::ObstacleMobility;
+use pomdp::{Purpose, Seed};
+use prior::posterior::{STEP_VALUES, step_values};
+use prior::write_atomically;
+use program::{Failed, typed};
+use push_task::config::ForceSensing;
+use push_task::coordinates::START;
+use push_task::state::State;
+use push_task::{Action, Coordinates, Observation, Particle};
+use rayon::prelude::*;
+use scenario::{Problem, Scenario, Selection};
+use serde_json::{Value, json};
+
+/// Writes a dataset as arrays of starts and steps, for training/posterior.py.
+#[derive(Debug, Parser)]
+#[command(name = "posterior-data", version, after_help = EXAMPLES)]
+struct Arguments {
+    /// Arm: sawyer or jaco.
+    #[arg(long, default_value = "sawyer")]
+    robot: String,
+    /// Folder of the dataset.
+    #[arg(long)]
+    data: PathBuf,
+    /// Scenario that the dataset was made of: what `datagen` was given.
+    #[arg(long, default_value = "training")]
+    scenario: String,
+    /// Scenario entries that `datagen` was given: key=value.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Folder of the arrays, starts.f32, and of what they are, starts.json.
+    #[arg(long)]
+    out: PathBuf,
+    /// Worker threads [default: all cores]; the arrays do not depend on it.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
+    #[arg(long)]
+    root: Option<PathBuf>,
+}
+
+const EXAMPLES: &str = "\
+Example:
+  cargo xtask posterior-data --data runs/data/sawyer-fixed --set data.movable_share=0.0 --out runs/starts/sawyer-fixed";
+
+/// What went wrong after the input was found to be good.
+const FAILED: Failed = Failed::new("the arrays were not written");
+
+fn main() -> ExitCode {
+    program::finish(run(&program::parse()))
+}
+
+fn run(arguments: &Arguments) -> Result<()> {
+    let root = scenario::project_root(arguments.root.as_deref())?;
+    rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
+    let reader = Reader::open(&arguments.data)?;
+    let selection = Selection {
+        domain: arguments.scenario.clone(),
+        robot: arguments.robot.clone(),
+        set: arguments.set.clone(),
+        ..Selection::new(&root)
+    };
+    let scenario = selection.load()?;
+    let (found, expected) = (&reader.manifest().scenario_hash, scenario.hash());
+    ensure!(
+        *found == expected,
+        "{}: scenario_hash is {found}, and that of --robot, --scenario and --set is {expected}: give those of datagen",
+        arguments.data.join("meta/info.json").display()
+    );
+    let mobility = mobility(&scenario)?;
+    let problem = Problem::assemble(&scenario.with_mobility(mobility), &root)?;
+    whole_file::check_owner(&arguments.out, "starts.json")?;
+
+    let (mut values, mut episodes, mut steps) = (Vec::new(), 0_u64, None);
+    for shard in 0..reader.manifest().shards.len() {
+        let recorded = reader.shard_episodes(shard)?;
+        // A world that diverged ends early; the others are as long as each other.
+        let length = *steps.get_or_insert(recorded.iter().map(Episode::rows).max().unwrap_or(0));
+        let rows: Vec<Option<Vec<f32>>> = recorded
+            .par_iter()
+            .map(|episode| if episode.rows() == length { row(&problem, episode) } else { None })
+            .collect();
+        for row in rows.into_iter().flatten() {
+            episodes += 1;
+            values.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+        }
+    }
+    let about = about(&problem, mobility, &reader, episodes, steps.unwrap_or(0));
+    write_atomically(&arguments.out.join("starts.f32"), &values).context(FAILED)?;
+    let text = serde_json::to_string_pretty(&about).context(FAILED)?;
+    write_atomically(&arguments.out.join("starts.json"), text.as_bytes()).context(FAILED)?;
+    let left_out = reader.manifest().episodes - episodes;
+    program::out!("{}: {episodes} episodes, {left_out} that diverged are left out", typed(&arguments.out));
+    Ok(())
+}
+
+/// That of all worlds of the dataset.
+fn mobility(scenario: &Scenario) -> Result<ObstacleMobility> {
+    match scenario.data.movable_share {
+        0.0 => Ok(ObstacleMobility::Fixed),
+        1.0 => Ok(ObstacleMobility::Movable),
+        share => {
+            bail!("data.movable_share is {share}, expected 0.0 or 1.0: a network is for one mobility of the obstacle")
+        }
+    }
+}
+
+/// Classes, coordinates and steps of an episode; `None` where its start is outside the distribution.
+fn row(problem: &Problem, episode: &Episode) -> Option<Vec<f32>> {
+    let model = &problem.model;
+    let joints = model.joint_count();
+    let observation = |row: usize| Observation(episode.observation(row).iter().map(|v| f64::from(*v)).collect());
+    let theta = episode.theta.as_slice().try_into().ok()?;
+    let theta = Theta::from_parts(&theta, [episode.classes[0], episode.classes[1]].map(usize::from));
+    let state = State::from_slice(episode.state(0), joints, theta.obstacle.is_some());
+    let coordinates = Coordinates::new(model, &problem.beliefs, &problem.start_joints_rad, &observation(0));
+    let mut rng = Seed(0).stream(Purpose::Resolution, episode.episode);
+    let z = coordinates.of(&Particle::new(state, theta), &mut rng)?;
+    let mut row: Vec<f32> = episode.classes[..2].iter().map(|class| f32::from(*class)).collect();
+    row.extend(z[..START].iter().map(|z| *z as f32));
+    for step in 0..episode.rows() {
+        let action = usize::try_from(episode.action[step]).ok().and_then(|index| Action::ALL.get(index).copied());
+        row.extend(step_values(model, action, &observation(step), &episode.state(step)[..joints]));
+    }
+    Some(row)
+}
+
+/// What the arrays are.
+fn about(problem: &Problem, mobility: ObstacleMobility, reader: &Reader, episodes: u64, steps: usize) -> Value {
+    let (sensor, manifest) = (&problem.model.config().sensor, reader.manifest());
+    let noise = &sensor.noise;
+    let (force, torque, joint) = (noise.force_n, noise.torque_nm, noise.joint_torque_nm);
+    let force_scale = match sensor.force {
+        ForceSensing::Wrist => [force, force, force, torque, torque, torque],
+        ForceSensing::JointTorques => [joint; 6],
+    };
+    json!({
+        "version": 1, "robot": problem.scenario.robot.name, "mobility": mobility,
+        "episodes": episodes, "steps": steps, "coordinates": START, "step_values": STEP_VALUES,
+        "force_scale": force_scale, "distribution": problem.beliefs,
+        "dataset": {
+            "plan_hash": manifest.plan_hash, "scenario_hash": manifest.scenario_hash, "seed": manifest.seed,
+            "transitions": manifest.transitions, "commit": manifest.commit,
+        },
+    })
+}
