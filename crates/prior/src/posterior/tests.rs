@@ -68,7 +68,6 @@ fn draws_follow_the_density() {
         let n = ratios.len() as f64;
         let mean = ratios.iter().sum::<f64>() / n;
         let error = (ratios.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (n * n)).sqrt();
-        println!("{pair}: {mean} ± {error}");
         assert!((mean - 1.0).abs() < 4.5 * error, "pair {pair}: {mean} ± {error}");
         assert!(error < 0.2, "{error}");
     }
