@@ -345,7 +345,11 @@ fn json_that_is_empty_or_cut_off_is_answered_in_words() {
         ),
         ("eval", "prior/prior.json", {
             let prior = path("prior");
-            format!("--domain D1 --quick --preset paper --methods rnn-sampling --prior {} --out {}", prior.display(), out.display())
+            format!(
+                "--domain D1 --quick --preset paper --methods rnn-sampling --prior {} --out {}",
+                prior.display(),
+                out.display()
+            )
         }),
         ("datagen", "plan/plan.json", format!("--transitions 2000 --out {}", path("plan").display())),
         ("diagnose-benchmark", "benchmark/plan.json", format!("--sets 0 --out {}", path("benchmark").display())),
