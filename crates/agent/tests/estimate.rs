@@ -62,14 +62,20 @@ fn start(history: &History<'_>, estimate: &Estimate<'_>, rng: &mut Rng) -> Optio
 
 #[test]
 fn a_number_that_is_known_exactly_leaves_the_prior() {
-    let problem = problem_with("D4", &["distribution.object.friction.stddev=0.0"]);
-    let (history, network) = episode(&problem, 2, 0);
-    let estimate = Estimate::network(&history, &network);
-    let mut rng = Seed(44).stream(Purpose::Test, 0);
-    let starts: Vec<_> = (0..40).filter_map(|_| start(&history, &estimate, &mut rng)).collect();
-    assert!(starts.len() > 10, "{} of 40 are possible", starts.len());
-    for (start, log_ratio, _) in starts {
-        assert_eq!((start.theta.object.friction, log_ratio), (0.4, 0.0));
+    let zero = "{ mean = 0.0, stddev = 0.0, low = 0.0, high = 0.0 }";
+    let com = format!("distribution.object.com_m=[{zero}, {zero}, {zero}]");
+    for known in ["distribution.object.friction.stddev=0.0", &com] {
+        let problem = problem_with("D4", &[known]);
+        let (history, network) = episode(&problem, 2, 0);
+        let estimate = Estimate::network(&history, &network);
+        let mut rng = Seed(44).stream(Purpose::Test, 0);
+        let starts: Vec<_> = (0..40).filter_map(|_| start(&history, &estimate, &mut rng)).collect();
+        assert!(starts.len() > 10, "{} of 40 are possible", starts.len());
+        for (start, log_ratio, _) in starts {
+            let object = &start.theta.object;
+            assert!(object.friction == 0.4 || object.com_m == [0.0; 3], "{object:?}");
+            assert_eq!(log_ratio, 0.0);
+        }
     }
 }
 

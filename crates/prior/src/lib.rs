@@ -20,7 +20,7 @@
 //!   episodes that touched it, and denies it in 64.6 % of those without one. An LSTM trained only for this reached 82
 //!   to 90 % and 75 to 55 %. The Jaco does better, as its hand holds the object.
 //! - **The action** is an optional input (`train --action-input`), off as published. With it the Sawyer prior gains 0.2
-//!   nats per step. The networks of preset `paper` do without, those of the bridge filter have it.
+//!   nats per step. The shipped networks do without; [`posterior`] always has it.
 //! - **Dropout** 0.1 on the output of each layer, by held-out likelihood at epoch 100: −117.85, −118.29, −118.20 nats a step for 0, 0.1, 0.2.
 //!   A cosine schedule instead of a constant rate.
 //! - **One factor per target** scales the stated spread, fitted on the held-out part ([`TrainConfig::rescale`]): a

@@ -199,15 +199,6 @@ impl Mixture {
         Draw { values, classes: classes.collect(), component }
     }
 
-    /// One draw, given the label of each class target, which must be possible.
-    #[must_use]
-    pub fn sample_given(&self, classes: &[usize], rng: &mut Rng) -> Draw {
-        let joint: Vec<f64> = self.joint(classes).collect();
-        let total = log_sum_exp(joint.iter().copied());
-        let component = pick(joint.iter().map(|log| (log - total).exp()), rng);
-        Draw { values: self.values(component, rng), classes: classes.to_vec(), component }
-    }
-
     /// Continuous values drawn from a component.
     fn values(&self, component: usize, rng: &mut Rng) -> Vec<f64> {
         let gaussians = self.means(component).iter().zip(self.stddevs(component));

@@ -63,14 +63,15 @@ impl PosteriorNetwork {
     pub fn load(folder: &Path, robot: &str, model: &PushModel) -> Result<Self, Error> {
         let weights = file::load(folder)?;
         let path = folder.join(FILE);
-        let refuse = |reason: String| Err(Error::Format { path, reason });
         if weights.robot != robot {
-            return refuse(format!("is trained for the robot `{}`, but this problem uses `{robot}`", weights.robot));
+            return Err(Error::Robot { path, found: weights.robot, expected: robot.into() });
         }
-        let mobility = model.config().world.obstacle_mobility;
-        if weights.mobility != mobility {
-            let found = weights.mobility;
-            return refuse(format!("is trained for obstacles that are {found:?}, but here they are {mobility:?}"));
+        if weights.mobility != model.config().world.obstacle_mobility {
+            let reason = match weights.mobility {
+                ObstacleMobility::Fixed => "trained for obstacles that cannot move, but here they can",
+                ObstacleMobility::Movable => "trained for obstacles that can move, but here they cannot",
+            };
+            return Err(Error::Format { path, reason: reason.into() });
         }
         Ok(Self { state: weights.lstm.start(), weights: Arc::new(weights), seen: None, latest: None })
     }

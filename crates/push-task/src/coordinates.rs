@@ -214,14 +214,14 @@ impl Coordinates<'_> {
         }
     }
 
-    /// Whether no number of a start but the centre of mass and the object's pose is known exactly.
+    /// Whether no number of a start is known exactly, so that all have a density.
     #[must_use]
     pub fn has_density(&self) -> bool {
         let (d, b) = (&self.prior.object, &self.prior.obstacle);
+        let of_object = d.com_m.iter().chain([&d.friction, &d.x_m, &d.y_m, &d.yaw_rad]).chain(d.size_m.parts());
         let obstacle = b.shape[..NO_OBSTACLE].iter().any(|probability| *probability > 0.0);
-        let place = [&b.x_m, &b.y_m, &b.yaw_rad];
-        let of_obstacle = b.size_m.parts().chain(place).filter(|_| obstacle);
-        d.size_m.parts().chain([&d.friction]).chain(of_obstacle).all(|part| part.stddev > 0.0)
+        let of_obstacle = b.size_m.parts().chain([&b.x_m, &b.y_m, &b.yaw_rad]).filter(|_| obstacle);
+        of_object.chain(of_obstacle).all(|part| part.stddev > 0.0)
     }
 
     /// All coordinates of a start: the inverse of [`Self::start`]. What a start does not show is drawn from its prior given what it shows: where the

@@ -6,7 +6,7 @@ use std::path::Path;
 use physics_model::config::ObstacleMobility;
 use push_task::coordinates::START;
 use push_task::sampling::WorldDistribution;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::features::{Features, INPUTS};
@@ -23,10 +23,11 @@ const VERSION: u64 = 1;
 /// Widest LSTM, most hidden units and components of a coordinate.
 const MOST: usize = 4096;
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Manifest {
-    version: u64,
+    #[serde(rename = "version")]
+    _version: u64,
     robot: String,
     mobility: ObstacleMobility,
     /// Widths of the LSTM's layers.
@@ -37,8 +38,9 @@ struct Manifest {
     force_scale: [f64; 6],
     distribution: WorldDistribution,
     weights: FileRef,
-    /// How it was made.
-    provenance: BTreeMap<String, Value>,
+    /// How it was made: for readers of the file.
+    #[serde(rename = "provenance")]
+    _provenance: BTreeMap<String, Value>,
 }
 
 impl Manifest {

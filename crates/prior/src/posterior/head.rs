@@ -37,7 +37,7 @@ pub(super) struct Head {
 }
 
 impl Head {
-    /// Place in the order of each coordinate.
+    /// Whether the classes of a pair use a coordinate.
     fn awake(pair: usize) -> impl Fn(usize) -> bool {
         let (shape, obstacle) = (pair / (NO_OBSTACLE + 1), pair % (NO_OBSTACLE + 1));
         let shapes = (ObjectShape::ALL[shape], ObjectShape::ALL.get(obstacle).copied());
