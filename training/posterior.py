@@ -150,14 +150,26 @@ def judge(network, data, device):
     return {"log_pair": of_pair, "gain": gain, "brier_obstacle": brier, "log_shape": shape}
 
 
+def load_all(folders):
+    """Pairs, coordinates and features of several folders of one kind, and what each file is."""
+    parts, abouts = [], []
+    for folder in folders:
+        pairs, z, steps, about = load(folder)
+        abouts.append(about)
+        for key in ("robot", "mobility", "distribution", "force_scale", "steps"):
+            if about[key] != abouts[0][key]:
+                raise SystemExit(f"{folder}: {key} differs from that of {folders[0]}")
+        parts.append((pairs, z, features(steps, about["force_scale"])))
+    return [torch.cat(part) for part in zip(*parts)], abouts
+
+
 def train(arguments, device):
-    pairs, z, steps, about = load(arguments.train)
-    x = features(steps, about["force_scale"])
-    held_pairs, held_z, held_steps, held_about = load(arguments.held_out)
+    (pairs, z, x), abouts = load_all(arguments.train)
+    held_out, (held_about,) = load_all([arguments.held_out])
+    about = abouts[0]
     for key in ("robot", "mobility", "distribution", "force_scale"):
         if about[key] != held_about[key]:
-            raise SystemExit(f"{arguments.held_out}: {key} differs from that of {arguments.train}")
-    held_out = (held_pairs, held_z, features(held_steps, about["force_scale"]))
+            raise SystemExit(f"{arguments.held_out}: {key} differs from that of {arguments.train[0]}")
     network = Network(x.shape[-1], arguments.hidden, arguments.units, arguments.components, arguments.dropout)
     rows = x[:20000].reshape(-1, x.shape[-1])
     network.norm_m.data.copy_(rows.mean(0))
@@ -175,8 +187,9 @@ def train(arguments, device):
             for group in optimiser.param_groups:
                 group["lr"] = arguments.rate * warm * 0.5 * (1 + math.cos(math.pi * done))
             chosen = order[batch * arguments.batch : (batch + 1) * arguments.batch]
-            of_pair, log_density, _ = network(*(part[chosen].to(device) for part in (x, pairs, z)))
-            loss = -(of_pair + log_density).mean()
+            with torch.autocast(device, dtype=torch.bfloat16, enabled=arguments.bf16):
+                of_pair, log_density, _ = network(*(part[chosen].to(device) for part in (x, pairs, z)))
+                loss = -(of_pair + log_density).mean()
             optimiser.zero_grad(set_to_none=True)
             loss.backward()
             nn.utils.clip_grad_norm_(network.parameters(), 5.0)
@@ -188,7 +201,7 @@ def train(arguments, device):
             best = (score, {name: value.cpu().clone() for name, value in network.state_dict().items()})
     torch.save(best[1], os.path.join(arguments.out, "network.pt"))
     stage = {
-        "data": about["dataset"],
+        "data": [about["dataset"] for about in abouts],
         "held_out": held_about["dataset"],
         "settings": {k: v for k, v in vars(arguments).items() if k not in ("train", "held_out", "out", "init", "threads")},
         "continues": bool(arguments.init),
@@ -252,10 +265,10 @@ def write(folder, state, about, provenance):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--train", required=True, help="folder of cargo xtask posterior-data")
+    parser.add_argument("--train", required=True, nargs="+", help="folders of cargo xtask posterior-data")
     parser.add_argument("--held-out", required=True, help="the same of another seed: chooses the epoch")
     parser.add_argument("--out", required=True, help="folder of the network")
-    parser.add_argument("--init", help="network.pt to go on from")
+    parser.add_argument("--init", help="network.pt to go on from, in the folder of its posterior.json")
     parser.add_argument("--hidden", type=int, default=256)
     parser.add_argument("--units", type=int, default=32, help="hidden units of a coordinate")
     parser.add_argument("--components", type=int, default=8, help="Gaussians of a coordinate")
@@ -264,6 +277,7 @@ def main():
     parser.add_argument("--rate", type=float, default=2e-3)
     parser.add_argument("--weight-decay", type=float, default=0.01)
     parser.add_argument("--dropout", type=float, default=0.1)
+    parser.add_argument("--bf16", action="store_true", help="products of matrices in bfloat16: on a CPU with it 1.7 times as fast")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=0, help="of the CPU; 0: all")
     arguments = parser.parse_args()
@@ -274,7 +288,11 @@ def main():
         torch.set_num_threads(arguments.threads)
     torch.manual_seed(arguments.seed)
     state, about, stage = train(arguments, "cuda" if torch.cuda.is_available() else "cpu")
-    write(arguments.out, state, about, {"program": "training/posterior.py", "stages": [stage]})
+    earlier = []
+    if arguments.init:
+        with open(os.path.join(os.path.dirname(arguments.init), "posterior.json")) as file:
+            earlier = json.load(file)["provenance"]["stages"]
+    write(arguments.out, state, about, {"program": "training/posterior.py", "stages": earlier + [stage]})
 
 
 if __name__ == "__main__":

@@ -29,11 +29,13 @@ mod history;
 pub mod model;
 mod perturb;
 pub mod reward;
+mod route;
 pub mod sampling;
 pub mod sensor;
 mod simulation;
 pub mod state;
 mod transition_noise;
+mod way;
 
 pub use action::Action;
 pub use config::PushConfig;

@@ -1,5 +1,6 @@
 //! The pushing task as a generative model: conformance, rewards, sensors, determinism.
 
+mod goal_policy;
 #[path = "../support/mod.rs"]
 mod support;
 mod unknown_effects;
