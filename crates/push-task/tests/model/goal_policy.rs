@@ -39,7 +39,7 @@ fn beyond(model: &PushModel, joints: &[f64], (x_m, y_m): (f64, f64)) -> Particle
 #[test]
 fn it_goes_round_the_object_where_it_starts_on_the_wrong_side_and_expects_what_that_earns() {
     let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
-    for place in [(0.53, 0.2), (0.47, 0.18), (0.56, 0.19)] {
+    for place in [(0.53, 0.2), (0.47, 0.18)] {
         let start = beyond(&model, &joints, place);
         let expected = GoalPolicy.leaf_value(&model, &start, LONGEST);
         let (earned, count) = follow(&model, start).unwrap_or_else(|| panic!("{place:?} is not solved"));
