@@ -287,11 +287,11 @@ def main():
     if arguments.threads:
         torch.set_num_threads(arguments.threads)
     torch.manual_seed(arguments.seed)
-    state, about, stage = train(arguments, "cuda" if torch.cuda.is_available() else "cpu")
     earlier = []
     if arguments.init:
         with open(os.path.join(os.path.dirname(arguments.init), "posterior.json")) as file:
             earlier = json.load(file)["provenance"]["stages"]
+    state, about, stage = train(arguments, "cuda" if torch.cuda.is_available() else "cpu")
     write(arguments.out, state, about, {"program": "training/posterior.py", "stages": earlier + [stage]})
 
 
