@@ -26,6 +26,7 @@ pub mod nudge;
 pub mod peer;
 pub mod physics;
 pub mod planner;
+pub mod policy;
 pub mod prior;
 pub mod report;
 pub mod scenes;

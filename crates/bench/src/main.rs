@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
-use bench::{calibration, log_faults, nudge, planner, prior, report};
+use bench::{calibration, log_faults, nudge, planner, policy, prior, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
 use serde_json::Value;
@@ -79,6 +79,31 @@ enum What {
         /// How far the object is moved along y, m.
         #[arg(long, default_value_t = 1e-8)]
         nudge_m: f64,
+        /// Overrides a scenario entry: key=value.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+    },
+    /// What the policy of the rollouts earns without a search where it knows the world, and how far its leaf values are off.
+    #[command(after_help = "Examples:\n  cargo xtask bench policy --domain D4 --worlds 1000")]
+    Policy {
+        /// Domain: D1 to D5, or a scenario file.
+        #[arg(long, default_value = "D4")]
+        domain: String,
+        /// Arm: sawyer, jaco, or a robot file.
+        #[arg(long)]
+        robot: Option<String>,
+        /// Worlds.
+        #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+        worlds: u32,
+        /// Root seed.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// The obstacle is known only once it has been touched.
+        #[arg(long)]
+        blind: bool,
+        /// Prints the steps of this world alone.
+        #[arg(long, value_name = "WORLD")]
+        trace: Option<u32>,
         /// Overrides a scenario entry: key=value.
         #[arg(long = "set", value_name = "KEY=VALUE")]
         set: Vec<String>,
@@ -191,6 +216,14 @@ fn run(arguments: &Arguments) -> Result<()> {
         What::Nudge { trials, domain, nudge_m, set } => {
             let task = nudge::Task { domain: domain.clone(), nudge_m: *nudge_m, set: set.clone() };
             program::out!("{}", serde_json::to_string_pretty(&nudge::run(&root, &task, trials)?)?);
+        }
+        What::Policy { domain, robot, worlds, seed, blind, trace, set } => {
+            let (domain, robot, set) = (domain.clone(), robot.clone(), set.clone());
+            let task = policy::Task { domain, robot, worlds: *worlds, seed: *seed, blind: *blind, trace: *trace, set };
+            match policy::run(&root, &task)? {
+                Value::Array(steps) => steps.iter().for_each(|step| program::out!("{step}")),
+                figures => program::out!("{figures}"),
+            }
         }
         What::Planner { episodes, quick, only, seed, set, out, json } => {
             let effort = planner::Effort { episodes: *episodes, quick: *quick };

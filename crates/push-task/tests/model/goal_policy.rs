@@ -3,10 +3,10 @@
 use physics_model::config::ObstacleMobility;
 use physics_model::{BodyState, ObjectShape, ObstacleTheta};
 use pomdp::{Outcome, Policy as _, Purpose, Seed};
-use push_task::{GoalPolicy, Particle, PushModel};
+use push_task::{Action, GoalPolicy, Particle, PushModel};
 
 use super::support::model;
-use super::{particle, with_obstacle};
+use super::{PLUS_Y, particle, with_obstacle};
 
 /// Actions that an episode may take.
 const LONGEST: usize = 45;
@@ -77,4 +77,23 @@ fn it_pushes_past_an_obstacle_that_it_sees() {
     start.state.obstacle.as_mut().expect("an obstacle").position_m[0] = 0.56;
     let (_, count) = follow(&model, start).expect("solved");
     assert!(count < 30, "{count} actions");
+}
+
+#[test]
+fn a_tool_that_presses_the_object_against_an_obstacle_backs_off_before_it_goes_round() {
+    let (model, joints) = model("sawyer", ObstacleMobility::Fixed);
+    let mut start = with_obstacle(particle(&model, &joints, -0.12), 0.02);
+    start.theta.obstacle =
+        Some(ObstacleTheta { shape: ObjectShape::Cylinder, mass_kg: 1.0, size_m: [0.03, 0.03, 0.1] });
+    start.state.obstacle.as_mut().expect("an obstacle").position_m[0] = 0.56;
+    let mut rng = Seed(1).stream(Purpose::Test, 0);
+    // Straight on, until it is stuck.
+    for _ in 0..8 {
+        model.act(&mut start, Action::ALL[PLUS_Y], &mut rng);
+    }
+    let stuck = start.state.object.position_m[1];
+    model.act(&mut start, Action::ALL[PLUS_Y], &mut rng);
+    assert!((start.state.object.position_m[1] - stuck).abs() < 0.004, "{:?} does not stick", start.state.object);
+    let (_, count) = follow(&model, start).expect("solved");
+    assert!(count < 35, "{count} actions");
 }
