@@ -114,3 +114,34 @@ fn state(model: &PushModel, particle: &Particle, action: Action, value: f64) -> 
         "action": action.index(), "value": value,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn task(blind: bool, trace: Option<u32>) -> Task {
+        Task { domain: "D4".into(), robot: None, worlds: 40, seed: 1, blind, trace, set: Vec::new() }
+    }
+
+    fn root() -> std::path::PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+    }
+
+    #[test]
+    fn an_obstacle_that_has_to_be_felt_costs_return_and_the_same_seed_says_the_same() {
+        let [seen, felt] = [false, true].map(|blind| run(&root(), &task(blind, None)).unwrap());
+        let value = |figures: &Value, key: &str| figures[key].as_f64().unwrap();
+        assert!(value(&seen, "return") > value(&felt, "return") + 1.0, "{seen} {felt}");
+        assert_eq!(seen["leaf_value"], felt["leaf_value"], "the same worlds");
+        assert_eq!(value(&felt, "solved") as usize + felt["unsolved"].as_array().unwrap().len(), 40);
+        assert_eq!(felt, run(&root(), &task(true, None)).unwrap());
+    }
+
+    #[test]
+    fn a_trace_has_the_steps_of_its_world_alone() {
+        let steps = run(&root(), &task(false, Some(3))).unwrap();
+        let steps = steps.as_array().unwrap();
+        assert!((5..=40).contains(&steps.len()), "{} steps", steps.len());
+        assert!(steps.iter().all(|step| step["action"].as_u64().unwrap() < 10 && step["tool_mm"].is_array()));
+    }
+}

@@ -11,6 +11,11 @@ use crate::scene::{Move, Plan, Scene};
 const OWN_VISITS: u32 = 3;
 const OTHERS_COST: f64 = 5.0;
 
+/// Actions that the policy takes: a number and a factor on the plan's steps, for boxes, cylinders and spheres, each on a straight way and round an obstacle.
+/// Least squares of the discounted return that it then earned, over the first twelve actions in 1,000 worlds each of D4 and D5 (seed 1006). The plan's own
+/// steps promise 74 where 63 is earned, and 63 where 38 is; a search then puts off what it would have to find out.
+const DELAYS: [[(f64, f64); 2]; 3] = [[(1.5, 1.1), (3.5, 1.7)], [(1.0, 1.0), (3.5, 1.0)], [(3.0, 1.2), (5.0, 1.45)]];
+
 /// Pushes the object the shortest way to the goal region, past an obstacle on either side, and steers back to that way. Before that it brings the tool
 /// to the place behind the object, round whatever stands in between. It sees the whole state, so it is a rollout policy and a demonstration, not a plan.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,14 +44,16 @@ impl GoalPolicy {
         best.1
     }
 
-    /// As if tool and object went their ways step by step.
-    fn value(model: &PushModel, plan: Option<&Plan>, actions_left: usize) -> f64 {
+    /// What the policy earns by the plan, as [`DELAYS`] says.
+    fn value(model: &PushModel, particle: &Particle, plan: Option<&Plan>, actions_left: usize) -> f64 {
         let task = &model.config().task;
         let weight = |steps: f64| task.discount.powf(steps);
         // Σ γ^t over the steps; their number where nothing is discounted.
         let sum = |steps: f64| if task.discount < 1.0 { (1.0 - weight(steps)) / (1.0 - task.discount) } else { steps };
-        match plan.map(|plan| (plan.length_m / task.step_m).max(1.0)) {
-            Some(steps) if steps <= actions_left as f64 => {
+        match plan.map(|plan| (plan, (plan.length_m / task.step_m).max(1.0))) {
+            Some((plan, steps)) if steps <= actions_left as f64 => {
+                let (fixed, factor) = DELAYS[particle.theta.object.shape as usize][usize::from(plan.bent)];
+                let steps = fixed + factor * steps;
                 task.reward.step * sum(steps) + task.reward.goal * weight(steps - 1.0)
             }
             _ => task.reward.step * sum(actions_left as f64),
@@ -63,7 +70,7 @@ impl Policy<PushModel> for GoalPolicy {
     /// hundred simulations then need not try all ten actions at every node before it goes deeper.
     fn priors(&self, model: &PushModel, particle: &Particle, priors: &mut [ActionPrior]) {
         let plan = Scene::new(model, particle).plan();
-        let value = Self::value(model, plan.as_ref(), model.config().task.horizon);
+        let value = Self::value(model, particle, plan.as_ref(), model.config().task.horizon);
         let own = Self::first(model, particle, plan.as_ref()).index();
         for (index, prior) in priors.iter_mut().enumerate() {
             let (visits, value) = if index == own { (OWN_VISITS, value) } else { (1, value - OTHERS_COST) };
@@ -72,6 +79,6 @@ impl Policy<PushModel> for GoalPolicy {
     }
 
     fn leaf_value(&self, model: &PushModel, particle: &Particle, actions_left: usize) -> f64 {
-        Self::value(model, Scene::new(model, particle).plan().as_ref(), actions_left)
+        Self::value(model, particle, Scene::new(model, particle).plan().as_ref(), actions_left)
     }
 }

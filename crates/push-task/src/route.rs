@@ -12,13 +12,15 @@ pub(crate) struct Route {
     pub(crate) length_m: f64,
     /// Where it goes first, a unit vector.
     pub(crate) heading: Vector2<f64>,
+    /// Whether it goes round something.
+    pub(crate) bent: bool,
 }
 
 /// The straight way, or, where `circle` is in between, the ways round it on either side: tangent, arc, tangent.
 pub(crate) fn routes(from: Vector2<f64>, to: Vector2<f64>, circle: Option<Circle>) -> Vec<Route> {
     let line = to - from;
     let Some(heading) = line.try_normalize(1e-9) else { return Vec::new() };
-    let straight = Route { length_m: line.norm(), heading };
+    let straight = Route { length_m: line.norm(), heading, bent: false };
     let Some(circle) = circle else { return vec![straight] };
     let (near, far) = (from - circle.center, to - circle.center);
     // A point within the circle touches what it stands for: it goes along it.
@@ -40,6 +42,7 @@ pub(crate) fn routes(from: Vector2<f64>, to: Vector2<f64>, circle: Option<Circle
         Route {
             length_m: tangents_m + radius_m * arc,
             heading: turned(-near / near.norm(), side * (radius_m / near.norm()).asin()),
+            bent: true,
         }
     };
     vec![round(1.0), round(-1.0)]

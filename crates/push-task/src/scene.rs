@@ -35,6 +35,8 @@ pub(crate) struct Plan {
     /// Of the tool to the place behind the object, and of the object to the goal region.
     pub(crate) length_m: f64,
     pub(crate) next: Move,
+    /// Whether the object has to go round the obstacle.
+    pub(crate) bent: bool,
 }
 
 pub(crate) enum Move {
@@ -161,10 +163,10 @@ impl<'a> Scene<'a> {
             // A wide tool meets the obstacle beside the object that it pushes.
             let direction = Self::clear_of([None, self.off[1]], direction);
             let way_m = (place - self.tool).dot(&along).max(0.0);
-            return Plan { length_m: way_m + push_m, next: Move::Along(direction) };
+            return Plan { length_m: way_m + push_m, next: Move::Along(direction), bent: route.bent };
         }
         let (way_m, next) = self.way_to(place, raised);
-        Plan { length_m: way_m + push_m, next }
+        Plan { length_m: way_m + push_m, next, bent: route.bent }
     }
 
     /// Whether a push from here presses the object against the obstacle.
