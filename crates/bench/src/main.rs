@@ -220,10 +220,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         What::Policy { domain, robot, worlds, seed, blind, trace, set } => {
             let (domain, robot, set) = (domain.clone(), robot.clone(), set.clone());
             let task = policy::Task { domain, robot, worlds: *worlds, seed: *seed, blind: *blind, trace: *trace, set };
-            match policy::run(&root, &task)? {
-                Value::Array(steps) => steps.iter().for_each(|step| program::out!("{step}")),
-                figures => program::out!("{figures}"),
-            }
+            program::out!("{}", policy::run(&root, &task)?);
         }
         What::Planner { episodes, quick, only, seed, set, out, json } => {
             let effort = planner::Effort { episodes: *episodes, quick: *quick };
