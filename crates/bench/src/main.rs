@@ -90,8 +90,8 @@ enum What {
         #[arg(long, default_value = "D4")]
         domain: String,
         /// Arm: sawyer, jaco, or a robot file.
-        #[arg(long)]
-        robot: Option<String>,
+        #[arg(long, default_value = "sawyer")]
+        robot: String,
         /// Worlds.
         #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
         worlds: u32,

@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use anyhow::Result;
+use physics_model::ObjectShape;
 use pomdp::{Outcome, Policy as _, Purpose, Seed};
+use problems::episode::mean_and_error;
+use push_task::config::TaskConfig;
 use push_task::{Action, GoalPolicy, Particle, PushModel};
 use rayon::prelude::*;
 use scenario::{Problem, Selection};
@@ -14,8 +17,8 @@ use serde_json::{Value, json};
 pub struct Task {
     /// Domain or scenario file.
     pub domain: String,
-    /// Arm; `None` for the domain's own.
-    pub robot: Option<String>,
+    /// Arm.
+    pub robot: String,
     /// Worlds.
     pub worlds: u32,
     /// Root seed.
@@ -28,11 +31,25 @@ pub struct Task {
     pub set: Vec<String>,
 }
 
+/// Actions of an episode from which delays are fitted: later ones are mostly of episodes that are lost.
+const FITTED_ACTIONS: usize = 12;
+
+/// A plan of the policy, and the discounted return from there on.
+#[derive(Clone, Copy, Debug)]
+struct Outlook {
+    shape: ObjectShape,
+    bent: bool,
+    steps: f64,
+    discounted_return: f64,
+}
+
 /// How a world ended.
 struct Played {
     solved: bool,
     discounted_return: f64,
     expected: f64,
+    outlooks: Vec<Outlook>,
+    /// Only where it is asked for.
     steps: Vec<Value>,
 }
 
@@ -42,38 +59,30 @@ struct Played {
 ///
 /// A scenario that does not load, and a distribution without a possible world.
 pub fn run(root: &Path, task: &Task) -> Result<Value> {
-    let (set, robot) = (task.set.clone(), task.robot.clone());
-    let mut selection = Selection { domain: task.domain.clone(), set, ..Selection::new(root) };
-    if let Some(robot) = robot {
-        selection.robot = robot;
-    }
+    let (domain, robot, set) = (task.domain.clone(), task.robot.clone(), task.set.clone());
+    let selection = Selection { domain, robot, set, ..Selection::new(root) };
     let problem = Problem::assemble(&selection.load()?, root)?;
-    let worlds: Vec<u32> = task.trace.map_or_else(|| (0..task.worlds).collect(), |world| vec![world]);
-    let played: Vec<Played> = worlds
-        .par_iter()
-        .map(|&world| play(&problem, task.blind, Seed(task.seed).child(Purpose::World, u64::from(world))))
-        .collect::<Result<_>>()?;
-    if task.trace.is_some() {
-        return Ok(json!(played[0].steps));
+    let play = |world: u32| play(&problem, task, Seed(task.seed).child(Purpose::World, u64::from(world)));
+    if let Some(world) = task.trace {
+        return Ok(json!(play(world)?.steps));
     }
-    let count = played.len() as f64;
-    let mean = |of: &dyn Fn(&Played) -> f64| played.iter().map(of).sum::<f64>() / count;
-    let mean_return = mean(&|world| world.discounted_return);
-    let variance = mean(&|world| (world.discounted_return - mean_return).powi(2)) * count / (count - 1.0).max(1.0);
-    let unsolved: Vec<u32> =
-        worlds.iter().zip(&played).filter(|(_, world)| !world.solved).map(|(&index, _)| index).collect();
+    let played: Vec<Played> = (0..task.worlds).into_par_iter().map(play).collect::<Result<_>>()?;
+    let each = |of: &dyn Fn(&Played) -> f64| -> Vec<f64> { played.iter().map(of).collect() };
+    let (mean_return, standard_error) = mean_and_error(&each(&|world| world.discounted_return));
+    let unsolved: Vec<usize> = (0..played.len()).filter(|&world| !played[world].solved).collect();
     Ok(json!({
         "domain": task.domain, "robot": task.robot, "seed": task.seed, "worlds": played.len(), "blind": task.blind, "set": task.set,
         "commit": scenario::commit(root),
         "solved": played.len() - unsolved.len(),
-        "return": mean_return, "standard_error": (variance / count).sqrt(),
-        "leaf_value": mean(&|world| world.expected),
-        "leaf_value_error": mean(&|world| (world.expected - world.discounted_return).abs()),
+        "return": mean_return, "standard_error": standard_error,
+        "leaf_value": mean_and_error(&each(&|world| world.expected)).0,
+        "leaf_value_error": mean_and_error(&each(&|world| (world.expected - world.discounted_return).abs())).0,
+        "delays": delays(&problem.truth.config().task, &played),
         "unsolved": unsolved,
     }))
 }
 
-fn play(problem: &Problem, blind: bool, seed: Seed) -> Result<Played> {
+fn play(problem: &Problem, asked: &Task, seed: Seed) -> Result<Played> {
     let model = &problem.truth;
     let policy = GoalPolicy;
     let mut particle = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
@@ -81,15 +90,27 @@ fn play(problem: &Problem, blind: bool, seed: Seed) -> Result<Played> {
     model.initial_observation(&mut particle, &mut rng);
     let task = model.config().task.clone();
     let expected = policy.leaf_value(model, &particle, task.horizon);
-    let mut played = Played { solved: false, discounted_return: 0.0, expected, steps: Vec::new() };
-    let (mut weight, mut known) = (1.0, !blind);
+    let mut played =
+        Played { solved: false, discounted_return: 0.0, expected, outlooks: Vec::new(), steps: Vec::new() };
+    let mut earned = Vec::new();
+    let (mut weight, mut known) = (1.0, !asked.blind);
     for left in (1..=task.horizon).rev() {
         let mut believed = particle.clone();
         if !known {
             (believed.theta.obstacle, believed.state.obstacle) = (None, None);
         }
+        if task.horizon - left < FITTED_ACTIONS
+            && let Some((steps, bent)) = GoalPolicy::plan(model, &particle)
+        {
+            // What was earned before and its weight, until the return is known.
+            earned.push((played.discounted_return, weight));
+            let shape = particle.theta.object.shape;
+            played.outlooks.push(Outlook { shape, bent, steps, discounted_return: 0.0 });
+        }
         let action = policy.action(model, &believed, &mut rng);
-        played.steps.push(state(model, &particle, action, policy.leaf_value(model, &particle, left)));
+        if asked.trace.is_some() {
+            played.steps.push(state(model, &particle, action, policy.leaf_value(model, &particle, left)));
+        }
         let (step, report) = model.act(&mut particle, action, &mut rng);
         known |= report.obstacle_touched;
         played.discounted_return += weight * step.reward;
@@ -99,7 +120,30 @@ fn play(problem: &Problem, blind: bool, seed: Seed) -> Result<Played> {
             break;
         }
     }
+    for (outlook, (before, weight)) in played.outlooks.iter_mut().zip(earned) {
+        outlook.discounted_return = (played.discounted_return - before) / weight;
+    }
     Ok(played)
+}
+
+/// By shape and way, the number and the factor that make a plan's steps the actions whose worth is nearest to what was earned.
+fn delays(task: &TaskConfig, played: &[Played]) -> Value {
+    let all: Vec<&Outlook> = played.iter().flat_map(|world| &world.outlooks).collect();
+    let fit = |shape: ObjectShape, bent: bool| {
+        let some: Vec<&&Outlook> =
+            all.iter().filter(|outlook| outlook.shape == shape && outlook.bent == bent).collect();
+        let squares = |fixed: f64, factor: f64| -> f64 {
+            let error = |o: &&&Outlook| GoalPolicy::worth(task, fixed + factor * o.steps, true) - o.discounted_return;
+            some.iter().map(|outlook| error(outlook).powi(2)).sum()
+        };
+        let grid = (0..32).flat_map(|a| (6..26).map(move |k| (f64::from(a) / 2.0, f64::from(k) / 10.0)));
+        let best = grid.map(|(a, k)| (squares(a, k), a, k)).min_by(|x, y| x.0.total_cmp(&y.0));
+        best.filter(|_| !some.is_empty())
+            .map(|(_, fixed, factor)| json!({ "fixed": fixed, "factor": factor, "plans": some.len() }))
+    };
+    let rows = [ObjectShape::Box, ObjectShape::Cylinder, ObjectShape::Sphere]
+        .map(|shape| (shape.name().to_owned(), json!({ "straight": fit(shape, false), "bent": fit(shape, true) })));
+    Value::Object(rows.into_iter().collect())
 }
 
 fn state(model: &PushModel, particle: &Particle, action: Action, value: f64) -> Value {
@@ -120,7 +164,7 @@ mod tests {
     use super::*;
 
     fn task(blind: bool, trace: Option<u32>) -> Task {
-        Task { domain: "D4".into(), robot: None, worlds: 40, seed: 1, blind, trace, set: Vec::new() }
+        Task { domain: "D4".into(), robot: "sawyer".into(), worlds: 40, seed: 1, blind, trace, set: Vec::new() }
     }
 
     fn root() -> std::path::PathBuf {
@@ -143,5 +187,24 @@ mod tests {
         let steps = steps.as_array().unwrap();
         assert!((5..=40).contains(&steps.len()), "{} steps", steps.len());
         assert!(steps.iter().all(|step| step["action"].as_u64().unwrap() < 10 && step["tool_mm"].is_array()));
+    }
+
+    #[test]
+    fn delays_are_found_again() {
+        let problem = Problem::assemble(&Selection::new(root()).load().unwrap(), &root()).unwrap();
+        let task = &problem.truth.config().task;
+        // The goal with the first action pays its reward, less one action.
+        assert_eq!(GoalPolicy::worth(task, 1.0, true), task.reward.step + task.reward.goal);
+        let outlook = |steps: f64| Outlook {
+            shape: ObjectShape::Sphere,
+            bent: true,
+            steps,
+            discounted_return: GoalPolicy::worth(task, 2.0 + 1.2 * steps, true),
+        };
+        let outlooks = (1..12).map(|steps| outlook(f64::from(steps))).collect();
+        let world = Played { solved: true, discounted_return: 0.0, expected: 0.0, outlooks, steps: Vec::new() };
+        let found = delays(task, &[world]);
+        assert_eq!(found["sphere"]["bent"], json!({ "fixed": 2.0, "factor": 1.2, "plans": 11 }));
+        assert!(found["sphere"]["straight"].is_null() && found["box"]["bent"].is_null());
     }
 }

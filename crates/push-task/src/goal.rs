@@ -4,6 +4,7 @@ use nalgebra::Vector2;
 use pomdp::{ActionPrior, Policy, Rng};
 
 use crate::action::Action;
+use crate::config::TaskConfig;
 use crate::model::{Particle, PushModel};
 use crate::scene::{Move, Plan, Scene};
 
@@ -12,7 +13,8 @@ const OWN_VISITS: u32 = 3;
 const OTHERS_COST: f64 = 5.0;
 
 /// Actions that the policy takes: a number and a factor on the plan's steps, for boxes, cylinders and spheres, each on a straight way and round an obstacle.
-/// Least squares of the discounted return that it then earned, over the first twelve actions in 1,000 worlds each of D4 and D5 (seed 1006). The plan's own
+/// Least squares of the discounted return that it then earned, over the first twelve actions in 1,000 worlds each of D4 and D5 (seed 1006), rounded between the
+/// two; `bench policy` prints them as `delays`. The plan's own
 /// steps promise 74 where 63 is earned, and 63 where 38 is; a search then puts off what it would have to find out.
 const DELAYS: [[(f64, f64); 2]; 3] = [[(1.5, 1.1), (3.5, 1.7)], [(1.0, 1.0), (3.5, 1.0)], [(3.0, 1.2), (5.0, 1.45)]];
 
@@ -44,19 +46,30 @@ impl GoalPolicy {
         best.1
     }
 
+    /// Steps of the plan in `particle`, and whether the object has to go round the obstacle. `None` where the tool cannot get behind the object.
+    #[must_use]
+    pub fn plan(model: &PushModel, particle: &Particle) -> Option<(f64, bool)> {
+        Scene::new(model, particle).plan().map(|plan| (plan.steps(model), plan.bent))
+    }
+
+    /// Discounted return where the last of `actions` reaches the goal, or of as many that do not. The pay for the first movement is left out.
+    #[must_use]
+    pub fn worth(task: &TaskConfig, actions: f64, reaches: bool) -> f64 {
+        let weight = |steps: f64| task.discount.powf(steps);
+        // Σ γ^t over the actions; their number where nothing is discounted.
+        let sum = if task.discount < 1.0 { (1.0 - weight(actions)) / (1.0 - task.discount) } else { actions };
+        task.reward.step * sum + if reaches { task.reward.goal * weight(actions - 1.0) } else { 0.0 }
+    }
+
     /// What the policy earns by the plan, as [`DELAYS`] says.
     fn value(model: &PushModel, particle: &Particle, plan: Option<&Plan>, actions_left: usize) -> f64 {
         let task = &model.config().task;
-        let weight = |steps: f64| task.discount.powf(steps);
-        // Σ γ^t over the steps; their number where nothing is discounted.
-        let sum = |steps: f64| if task.discount < 1.0 { (1.0 - weight(steps)) / (1.0 - task.discount) } else { steps };
-        match plan.map(|plan| (plan, (plan.length_m / task.step_m).max(1.0))) {
-            Some((plan, steps)) if steps <= actions_left as f64 => {
-                let (fixed, factor) = DELAYS[particle.theta.object.shape as usize][usize::from(plan.bent)];
-                let steps = fixed + factor * steps;
-                task.reward.step * sum(steps) + task.reward.goal * weight(steps - 1.0)
+        match plan.map(|plan| (plan.steps(model), plan.bent)) {
+            Some((steps, bent)) if steps <= actions_left as f64 => {
+                let (fixed, factor) = DELAYS[particle.theta.object.shape as usize][usize::from(bent)];
+                Self::worth(task, fixed + factor * steps, true)
             }
-            _ => task.reward.step * sum(actions_left as f64),
+            _ => Self::worth(task, actions_left as f64, false),
         }
     }
 }

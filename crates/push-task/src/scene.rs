@@ -39,6 +39,12 @@ pub(crate) struct Plan {
     pub(crate) bent: bool,
 }
 
+impl Plan {
+    pub(crate) fn steps(&self, model: &PushModel) -> f64 {
+        (self.length_m / model.config().task.step_m).max(1.0)
+    }
+}
+
 pub(crate) enum Move {
     /// In the plane; not of unit length.
     Along(Vector2<f64>),
