@@ -6,6 +6,7 @@ use crate::decision::{Decision, Verdict};
 use crate::design::{Design, Rows};
 use crate::features::Catalogue;
 use crate::group::{Findings, Group, Leftover, groups, is_friction, leftover};
+use crate::kinds::{Kind, kinds};
 use crate::log::Log;
 use crate::prepared::Prepared;
 use crate::search::{Found, Search, left};
@@ -54,6 +55,9 @@ pub struct InJoint {
     pub form: &'static str,
     /// Values.
     pub parameters: Vec<Value>,
+    /// Of friction: all kinds of it in this joint, fewest values first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kinds: Vec<Kind>,
 }
 
 /// An effect that the evidence is for.
@@ -235,6 +239,7 @@ fn joints(
                 log_evidence: term.gain,
                 form: candidate.effect.name,
                 parameters: wider(values(prepared, found, matrix, term), decision.wider(candidate.effect.name)),
+                kinds: kinds(prepared, found, term),
             }
         })
         .collect();

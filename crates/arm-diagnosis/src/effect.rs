@@ -47,6 +47,14 @@ effects! {
         ["coulomb" "N m", "viscous" "N m s/rad", "load" "1"];
     joint "directional_friction" "friction with load that is another one where the load drives the joint than where the motor does"
         ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1"];
+    joint "stribeck_load_friction" "friction with load that is higher at low speed: + c |τ| sgn(v) + (F_s + c_s |τ|) exp(−(v/v_s)²) sgn(v)"
+        ["coulomb" "N m", "viscous" "N m s/rad", "load" "1", "peak" "N m", "load_peak" "1", "stribeck_rate" "rad/s"];
+    joint "stribeck_directional_friction" "the same, with shares of load that differ by whether load or motor drives the joint"
+        ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1", "peak" "N m", "driving_peak" "1", "driven_peak" "1",
+            "stribeck_rate" "rad/s"];
+    joint "quadratic_load_friction" "the same, with the square of the load at low speed: + d τ² exp(−(v/v_s)²) sgn(v), by direction"
+        ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1", "peak" "N m", "driving_peak" "1", "driven_peak" "1",
+            "driving_square" "1/(N m)", "driven_square" "1/(N m)", "stribeck_rate" "rad/s"];
     joint "drifting_friction" "friction that changes with time, as by warmth: F(t) = F (1 + …)"
         ["coulomb" "N m", "viscous" "N m s/rad", "coulomb_change" "N m", "viscous_change" "N m s/rad", "time_constant" "s"];
     joint "presliding" "friction that builds up over a small angle after each reversal (Dahl)"
@@ -95,8 +103,17 @@ impl Effect {
     /// Whether it holds Coulomb and viscous friction and more.
     #[must_use]
     pub fn extends_friction(&self) -> bool {
-        ["stribeck_friction", "load_friction", "directional_friction", "drifting_friction", "presliding"]
-            .contains(&self.name)
+        const EXTEND: [&str; 8] = [
+            "stribeck_friction",
+            "load_friction",
+            "directional_friction",
+            "stribeck_load_friction",
+            "stribeck_directional_friction",
+            "quadratic_load_friction",
+            "drifting_friction",
+            "presliding",
+        ];
+        EXTEND.contains(&self.name)
     }
 }
 

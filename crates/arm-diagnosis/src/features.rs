@@ -73,7 +73,7 @@ impl Catalogue {
         catalogue
     }
 
-    fn push(&mut self, joint: Option<usize>, values: Vec<f64>, stddev: f64, positive: bool) -> usize {
+    pub(crate) fn push(&mut self, joint: Option<usize>, values: Vec<f64>, stddev: f64, positive: bool) -> usize {
         let same = |nuisance: &&usize| {
             let other = &self.features[**nuisance];
             other.joint == joint && !self.masses.contains(nuisance) && other.values == values
@@ -88,7 +88,7 @@ impl Catalogue {
         self.nuisances.push(place);
     }
 
-    fn candidate(&mut self, name: &str, joint: Option<usize>, setting: f64, features: Vec<usize>) {
+    pub(crate) fn candidate(&mut self, name: &str, joint: Option<usize>, setting: f64, features: Vec<usize>) {
         let effect = EFFECTS.iter().find(|effect| effect.name == name).expect("the name of an effect");
         self.candidates.push(Candidate { effect, joint, setting, features });
     }
@@ -161,51 +161,6 @@ impl Catalogue {
         self.nuisance(None, clock, nuisance::CLOCK_SECS);
         for values in tilted(prepared) {
             self.nuisance(None, values, nuisance::LEVEL_RAD);
-        }
-    }
-
-    fn add_friction(&mut self, prepared: &Prepared, joint: usize) {
-        let own = Some(joint);
-        let (scale, usual) = (0.3 * prepared.scale[joint], prepared.usual_rate[joint]);
-        let signs = prepared.signs(joint);
-        let rates = &prepared.motion[joint].rate;
-        // Added to what the file says: where that is something it may be too much.
-        let known = &prepared.log.arm.joints()[joint];
-        let (no_coulomb, no_viscous) = (known.friction <= 0.0, known.damping <= 0.0);
-        let (more, faster) = (scale.max(known.friction), (scale / usual).max(known.damping));
-        let coulomb = self.push(own, read(prepared, joint, &signs), more, no_coulomb);
-        let viscous = self.push(own, read(prepared, joint, rates), faster, no_viscous);
-        self.candidate("joint_friction", own, 0.0, vec![coulomb, viscous]);
-        for setting in [0.01, 0.02, 0.04, 0.08, 0.16, 0.32] {
-            let peak = signs.iter().zip(rates).map(|(sign, rate)| sign * (-(rate / setting).powi(2)).exp());
-            let peak = self.push(own, read(prepared, joint, &peak.collect::<Vec<_>>()), scale, true);
-            self.candidate("stribeck_friction", own, setting, vec![coulomb, viscous, peak]);
-        }
-        let passed = |tick: usize| prepared.rigid[joint][tick].abs() / prepared.gain(joint);
-        let load: Vec<f64> = signs.iter().enumerate().map(|(tick, sign)| sign * passed(tick)).collect();
-        let all = self.push(own, read(prepared, joint, &load), 0.2, true);
-        self.candidate("load_friction", own, 0.0, vec![coulomb, viscous, all]);
-        let driving = |tick: usize| prepared.rigid[joint][tick] * rates[tick] > 0.0;
-        let part = |wanted: bool| -> Vec<f64> {
-            load.iter().enumerate().map(|(tick, load)| if driving(tick) == wanted { *load } else { 0.0 }).collect()
-        };
-        let [with, against] =
-            [true, false].map(|wanted| self.push(own, read(prepared, joint, &part(wanted)), 0.2, true));
-        self.candidate("directional_friction", own, 0.0, vec![coulomb, viscous, with, against]);
-        let last = prepared.elapsed_secs.last().copied().unwrap_or(1.0).max(1e-9);
-        // From 0 to 1 over the log, quick at first or steadily.
-        for share in [0.15, 0.4, 1.0, 4.0] {
-            let grown = |series: &[f64]| -> Vec<f64> {
-                let growth = |time: f64| (1.0 - (-time / (share * last)).exp()) / (1.0 - (-1.0 / share).exp());
-                series.iter().zip(&prepared.elapsed_secs).map(|(value, time)| value * growth(*time)).collect()
-            };
-            let more = self.push(own, read(prepared, joint, &grown(&signs)), scale, false);
-            let slower = self.push(own, read(prepared, joint, &grown(rates)), scale / usual, false);
-            self.candidate("drifting_friction", own, share * last, vec![coulomb, viscous, more, slower]);
-        }
-        for setting in [5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02] {
-            let bristle = self.push(own, read(prepared, joint, &dahl(prepared, joint, setting)), scale, true);
-            self.candidate("presliding", own, setting, vec![viscous, bristle]);
         }
     }
 
@@ -320,7 +275,7 @@ fn given(prepared: &Prepared, joint: usize) -> Vec<f64> {
 }
 
 /// A series as a sensor with the joint's gain reads it.
-fn read(prepared: &Prepared, joint: usize, series: &[f64]) -> Vec<f64> {
+pub(crate) fn read(prepared: &Prepared, joint: usize, series: &[f64]) -> Vec<f64> {
     let gain = prepared.gain(joint);
     prepared.means(series).into_iter().map(|value| gain * value).collect()
 }
@@ -451,25 +406,6 @@ fn tilted(prepared: &Prepared) -> [Vec<f64>; 2] {
         }
         column
     })
-}
-
-/// Dahl's model (1968) in units of its Coulomb friction: z' = (v − |v| z) / width.
-fn dahl(prepared: &Prepared, joint: usize, width: f64) -> Vec<f64> {
-    let position = &prepared.motion[joint].position;
-    let mut all = vec![0.0; position.len()];
-    for span in prepared.ticks.spans() {
-        let mut z = 0.0_f64;
-        for tick in span.clone() {
-            if tick > span.start {
-                let moved: f64 = position[tick] - position[tick - 1];
-                // Exact for a step in one direction.
-                let end = moved.signum();
-                z = end + (z - end) * (-moved.abs() / width).exp();
-            }
-            all[tick] = z;
-        }
-    }
-    all
 }
 
 /// Second derivative in time of a series, over about 0.08 s.

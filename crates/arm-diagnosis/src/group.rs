@@ -83,8 +83,8 @@ pub fn is_friction(effect: &Effect) -> bool {
     effect.name == "joint_friction" || effect.extends_friction()
 }
 
-/// A kind of friction that takes away less than this share of what plain friction leaves is not told from it.
-const FINER: f64 = 0.05;
+/// A kind of friction that takes away less than this share of the squares that a simpler one leaves is not told from it.
+pub(crate) const FINER: f64 = 0.05;
 
 /// A kind of friction: what it explains beyond plain friction, and beyond the next kind, in ln evidence.
 struct Form {

@@ -10,8 +10,10 @@ mod effect;
 mod error;
 mod features;
 mod fit;
+mod friction;
 mod group;
 mod header;
+mod kinds;
 mod log;
 mod model;
 mod page;
@@ -36,6 +38,7 @@ pub use diagnosis::{
     Cell, Considered, Diagnosis, HeldOut, InJoint, NamedEffect, Remainder, Settings, diagnose, diagnose_with,
 };
 pub use group::{Findings, Leftover, is_friction};
+pub use kinds::Kind;
 pub use model::{model_toml, model_urdf};
 pub use page::page;
 pub use report::Report;

@@ -57,8 +57,39 @@ fn effects(report: &Report) -> Markup {
         .collect();
     html! {
         (table(&["effect", "joint", "form", "confidence", "values with 90 % intervals"].map(text), &rows))
+        (kinds(report))
         @if report.diagnosis.confusion_set.len() > 1 {
             p { "This log does not tell apart: " (report.diagnosis.confusion_set.join(", ")) "." }
+        }
+    }
+}
+
+/// What each kind of friction would leave, for the joints in which one is named.
+fn kinds(report: &Report) -> Markup {
+    let named =
+        report.diagnosis.effects.iter().flat_map(|effect| &effect.joints).filter(|joint| !joint.kinds.is_empty());
+    let rows: Vec<Vec<Markup>> = named
+        .flat_map(|joint| {
+            joint.kinds.iter().map(|kind| {
+                vec![
+                    text(joint.joint_name.as_deref().unwrap_or_default()),
+                    text(kind.name),
+                    text(kind.values),
+                    text(fixed(kind.log_evidence, 1)),
+                    text(significant(kind.heldout_rms_nm, 3)),
+                ]
+            })
+        })
+        .collect();
+    let heads =
+        ["joint", "kind of friction", "values", "ln evidence behind the best", "held-out torque error, N m"].map(text);
+    html! {
+        @if !rows.is_empty() {
+            p {
+                "Kinds of friction side by side. Named is the simplest kind whose evidence is within a factor of twenty of the best, or which leaves less than 5 % more "
+                "of the squared error."
+            }
+            (table(&heads, &rows))
         }
     }
 }

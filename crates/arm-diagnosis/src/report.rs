@@ -4,6 +4,8 @@ use serde::Serialize;
 
 use crate::decision::Verdict;
 use crate::diagnosis::{Diagnosis, InJoint, NamedEffect};
+use crate::effect::Effect;
+use crate::group::is_friction;
 use crate::log::Log;
 use crate::values::Value;
 
@@ -139,14 +141,15 @@ fn digits(value: &Value) -> usize {
 /// What would tell apart what this log does not.
 fn next_experiment(diagnosis: &Diagnosis) -> String {
     let has = |name: &str| diagnosis.confusion_set.iter().any(|other| other == name);
-    let friction = ["joint_friction", "stribeck_friction", "load_friction", "directional_friction", "presliding"];
+    let frictions =
+        diagnosis.confusion_set.iter().filter_map(|name| Effect::find(name)).filter(|effect| is_friction(effect));
     let sentence = if diagnosis.verdict == Verdict::Unknown {
         "move one joint at a time, slowly and fast, and in several postures: the joint and the phase that are left alone say what it is"
     } else if diagnosis.verdict == Verdict::None {
         "none needed for these motions; faster and slower ones, and other postures, may show more"
     } else if has("load_friction") && has("directional_friction") {
         "lift and lower a known load with the joint at the same speed: friction that depends on direction then differs"
-    } else if friction.iter().filter(|name| has(name)).count() > 1 {
+    } else if frictions.count() > 1 {
         "move the joint to and fro at many constant speeds from 0.01 rad/s up, and reverse it slowly"
     } else if has("payload") || has("torque_gain") || has("gravity_compensation") {
         "hold several postures, with and without a known weight at the tip"

@@ -8,12 +8,12 @@ use crate::design::{Columns, Design};
 use crate::effect::EFFECTS;
 use crate::features::{Candidate, Catalogue};
 use crate::fit::Fit;
-use crate::group::{coefficient, is_friction};
+use crate::group::{FINER, coefficient, is_friction};
 use crate::prepared::Prepared;
 
 /// Hypotheses of a model, at most.
 const MOST_TERMS: usize = 16;
-/// Gain of evidence that a finer kind of friction must have over a simpler one: twenty to one.
+/// Gain of evidence that a finer kind of friction must have over a simpler one: twenty to one, and [`FINER`] of what the simpler one leaves.
 const AS_GOOD: f64 = 3.0;
 /// Rounds in which each choice is looked at again.
 const ROUNDS: usize = 3;
@@ -187,9 +187,15 @@ impl Search {
             return;
         }
         let size = |place: usize| self.catalogue.candidates[place].features.len();
+        let rows = own.joint.map_or(0, |joint| self.design.fitted.of(joint).len()) as f64;
+        // Twice a gain in evidence is what the sum of squares loses, in variances of what is left.
+        let as_good_as = AS_GOOD.max(0.5 * rows * FINER / (1.0 - FINER));
         let as_good = ranked.iter().enumerate().filter(|(_, (place, gain))| {
             let other = &self.catalogue.candidates[*place];
-            most - gain < AS_GOOD && other.joint == own.joint && is_friction(other.effect) && size(*place) < size(first)
+            most - gain < as_good_as
+                && other.joint == own.joint
+                && is_friction(other.effect)
+                && size(*place) < size(first)
         });
         if let Some((place, _)) = as_good.min_by_key(|(_, (place, _))| size(*place)) {
             ranked[..=place].rotate_right(1);

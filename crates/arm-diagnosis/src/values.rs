@@ -90,8 +90,10 @@ pub(crate) fn values(prepared: &Prepared, found: &Found, covariance: &DMatrix<f6
     let slides = known.is_some_and(|joint| joint.slides);
     let normal: Vec<(f64, f64)> = match candidate.effect.name {
         "joint_friction" => vec![plus(0, friction), plus(1, damping)],
-        "stribeck_friction" | "load_friction" => vec![plus(0, friction), plus(1, damping), own(2)],
-        "directional_friction" | "drifting_friction" => vec![plus(0, friction), plus(1, damping), own(2), own(3)],
+        name if candidate.effect.extends_friction() && name != "presliding" => {
+            let more = (2..c.len()).map(own);
+            [plus(0, friction), plus(1, damping)].into_iter().chain(more).collect()
+        }
         "presliding" => vec![plus(0, damping), plus(1, friction)],
         "torque_ripple" | "encoder_eccentricity" => wave().to_vec(),
         "reflected_inertia" => vec![plus(0, candidate.joint.map_or(0.0, |joint| prepared.reflected_inertia(joint)))],
@@ -133,7 +135,8 @@ pub(crate) fn values(prepared: &Prepared, found: &Found, covariance: &DMatrix<f6
 
 /// The unit of a joint that slides for that of one that turns.
 fn unit(turning: &'static str, slides: bool) -> &'static str {
-    const SLIDING: [(&str, &str); 8] = [
+    const SLIDING: [(&str, &str); 9] = [
+        ("1/(N m)", "1/N"),
         ("N m", "N"),
         ("N m s/rad", "N s/m"),
         ("rad/s", "m/s"),
