@@ -41,20 +41,20 @@ macro_rules! effects {
 effects! {
     joint "joint_friction" "Coulomb and viscous friction: F_c sgn(v) + F_v v"
         ["coulomb" "N m", "viscous" "N m s/rad"];
-    joint "stribeck_friction" "friction that is higher at low speed: + F_s exp(−(v/v_s)²) sgn(v)"
-        ["coulomb" "N m", "viscous" "N m s/rad", "peak" "N m", "stribeck_rate" "rad/s"];
+    joint "stribeck_friction" "friction that is higher at low speed: + F_s exp(−|v/v_s|^α) sgn(v)"
+        ["coulomb" "N m", "viscous" "N m s/rad", "peak" "N m", "stribeck_rate" "rad/s", "curvature" "1"];
     joint "load_friction" "friction that grows with the torque that the joint passes on: + c |τ| sgn(v)"
         ["coulomb" "N m", "viscous" "N m s/rad", "load" "1"];
     joint "directional_friction" "friction with load that is another one where the load drives the joint than where the motor does"
         ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1"];
-    joint "stribeck_load_friction" "friction with load that is higher at low speed: + c |τ| sgn(v) + (F_s + c_s |τ|) exp(−(v/v_s)²) sgn(v)"
-        ["coulomb" "N m", "viscous" "N m s/rad", "load" "1", "peak" "N m", "load_peak" "1", "stribeck_rate" "rad/s"];
+    joint "stribeck_load_friction" "friction with load that is higher at low speed: + c |τ| sgn(v) + (F_s + c_s |τ|) exp(−|v/v_s|^α) sgn(v)"
+        ["coulomb" "N m", "viscous" "N m s/rad", "load" "1", "peak" "N m", "load_peak" "1", "stribeck_rate" "rad/s", "curvature" "1"];
     joint "stribeck_directional_friction" "the same, with shares of load that differ by whether load or motor drives the joint"
         ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1", "peak" "N m", "driving_peak" "1", "driven_peak" "1",
-            "stribeck_rate" "rad/s"];
-    joint "quadratic_load_friction" "the same, with the square of the load at low speed: + d τ² exp(−(v/v_s)²) sgn(v), by direction"
+            "stribeck_rate" "rad/s", "curvature" "1"];
+    joint "quadratic_load_friction" "the same, with the square of the load at low speed: + d τ² exp(−|v/v_s|^α) sgn(v), by direction"
         ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1", "peak" "N m", "driving_peak" "1", "driven_peak" "1",
-            "driving_square" "1/(N m)", "driven_square" "1/(N m)", "stribeck_rate" "rad/s"];
+            "driving_square" "1/(N m)", "driven_square" "1/(N m)", "stribeck_rate" "rad/s", "curvature" "1"];
     joint "drifting_friction" "friction that changes with time, as by warmth: F(t) = F (1 + …)"
         ["coulomb" "N m", "viscous" "N m s/rad", "coulomb_change" "N m", "viscous_change" "N m s/rad", "time_constant" "s"];
     joint "presliding" "friction that builds up over a small angle after each reversal (Dahl)"
@@ -103,17 +103,15 @@ impl Effect {
     /// Whether it holds Coulomb and viscous friction and more.
     #[must_use]
     pub fn extends_friction(&self) -> bool {
-        const EXTEND: [&str; 8] = [
-            "stribeck_friction",
-            "load_friction",
-            "directional_friction",
-            "stribeck_load_friction",
-            "stribeck_directional_friction",
-            "quadratic_load_friction",
-            "drifting_friction",
-            "presliding",
-        ];
-        EXTEND.contains(&self.name)
+        self.is_compound_friction()
+            || ["stribeck_friction", "load_friction", "directional_friction", "drifting_friction", "presliding"]
+                .contains(&self.name)
+    }
+
+    /// Whether it is friction that has the Stribeck effect and load at once.
+    #[must_use]
+    pub fn is_compound_friction(&self) -> bool {
+        ["stribeck_load_friction", "stribeck_directional_friction", "quadratic_load_friction"].contains(&self.name)
     }
 }
 

@@ -26,6 +26,8 @@ pub(crate) struct Candidate {
     pub(crate) effect: &'static Effect,
     pub(crate) joint: Option<usize>,
     pub(crate) setting: f64,
+    /// Of the Stribeck effect, a second setting; 0 of others.
+    pub(crate) curvature: f64,
     /// Places of its columns; those of Coulomb and viscous friction are shared with others.
     pub(crate) features: Vec<usize>,
 }
@@ -89,8 +91,13 @@ impl Catalogue {
     }
 
     pub(crate) fn candidate(&mut self, name: &str, joint: Option<usize>, setting: f64, features: Vec<usize>) {
+        self.shaped(name, joint, (setting, 0.0), features);
+    }
+
+    /// A candidate with two settings.
+    pub(crate) fn shaped(&mut self, name: &str, joint: Option<usize>, shape: (f64, f64), features: Vec<usize>) {
         let effect = EFFECTS.iter().find(|effect| effect.name == name).expect("the name of an effect");
-        self.candidates.push(Candidate { effect, joint, setting, features });
+        self.candidates.push(Candidate { effect, joint, setting: shape.0, curvature: shape.1, features });
     }
 
     fn add_masses(&mut self, prepared: &Prepared) {

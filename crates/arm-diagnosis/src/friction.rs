@@ -3,8 +3,9 @@
 use crate::features::{Catalogue, read};
 use crate::prepared::Prepared;
 
-/// Speeds below which the Stribeck effect shows, rad/s.
-const STRIBECK_RPS: [f64; 11] = [0.01, 0.014, 0.02, 0.028, 0.04, 0.057, 0.08, 0.113, 0.16, 0.226, 0.32];
+/// Of the Stribeck effect exp(−(v/v_s)^α): speeds v_s below which it shows, rad/s, and curvatures α. Servos have 1 to 2.5 (Duclusaud and Passault 2025).
+const STRIBECK_RPS: [f64; 6] = [0.01, 0.02, 0.04, 0.08, 0.16, 0.32];
+const CURVATURE: [f64; 2] = [1.25, 2.0];
 /// Spread of a share of load before the log is seen; of a quadratic one in units of the joint's typical torque.
 const SHARE: f64 = 0.2;
 
@@ -71,9 +72,14 @@ impl Catalogue {
         let mut column = |series: Vec<f64>, stddev: f64| self.push(own, read(prepared, joint, &series), stddev, true);
         let all = column(load.all.clone(), SHARE);
         let [driving, driven] = [&load.driving, &load.driven].map(|load| column(load.clone(), SHARE));
-        let peaks = STRIBECK_RPS.map(|setting| {
+        let shapes = STRIBECK_RPS.into_iter().flat_map(|setting| CURVATURE.map(|curvature| (setting, curvature)));
+        let mut peak_columns = |(setting, curvature): (f64, f64)| {
             let slow = |series: &[f64]| -> Vec<f64> {
-                series.iter().zip(rates).map(|(value, rate)| value * (-(rate / setting).powi(2)).exp()).collect()
+                series
+                    .iter()
+                    .zip(rates)
+                    .map(|(value, rate)| value * (-(rate / setting).abs().powf(curvature)).exp())
+                    .collect()
             };
             let square = |series: &[f64]| -> Vec<f64> {
                 slow(&series.iter().map(|value| value * value.abs()).collect::<Vec<_>>())
@@ -82,18 +88,19 @@ impl Catalogue {
             let loads = [&load.all, &load.driving, &load.driven].map(|load| column(slow(load), SHARE));
             let typical = prepared.scale[joint];
             let squares = [&load.driving, &load.driven].map(|load| column(square(load), SHARE / typical));
-            (setting, peak, loads, squares)
-        });
+            ((setting, curvature), peak, loads, squares)
+        };
+        let peaks: Vec<_> = shapes.map(&mut peak_columns).collect();
         self.candidate("load_friction", own, 0.0, vec![coulomb, viscous, all]);
         self.candidate("directional_friction", own, 0.0, vec![coulomb, viscous, driving, driven]);
-        for (setting, peak, [all_peak, driving_peak, driven_peak], [driving_square, driven_square]) in peaks {
-            self.candidate("stribeck_friction", own, setting, vec![coulomb, viscous, peak]);
+        for (shape, peak, [all_peak, driving_peak, driven_peak], [driving_square, driven_square]) in peaks {
+            self.shaped("stribeck_friction", own, shape, vec![coulomb, viscous, peak]);
             let both = vec![coulomb, viscous, all, peak, all_peak];
-            self.candidate("stribeck_load_friction", own, setting, both);
+            self.shaped("stribeck_load_friction", own, shape, both);
             let mut directed = vec![coulomb, viscous, driving, driven, peak, driving_peak, driven_peak];
-            self.candidate("stribeck_directional_friction", own, setting, directed.clone());
+            self.shaped("stribeck_directional_friction", own, shape, directed.clone());
             directed.extend([driving_square, driven_square]);
-            self.candidate("quadratic_load_friction", own, setting, directed);
+            self.shaped("quadratic_load_friction", own, shape, directed);
         }
     }
 

@@ -78,20 +78,21 @@ impl Search {
     pub(crate) fn run(self) -> Option<Found> {
         let null = self.fit(&[])?;
         let mut chosen: Vec<usize> = Vec::new();
-        let mut terms = Vec::new();
         for _ in 0..ROUNDS {
             let before = chosen.clone();
             while chosen.len() < MOST_TERMS {
-                let Some((best, _)) = self.ranked(&chosen)?.into_iter().next().filter(|(_, gain)| *gain > 0.0) else {
+                let Some((best, _)) = self.ranked(&chosen, None)?.into_iter().next().filter(|(_, gain)| *gain > 0.0)
+                else {
                     break;
                 };
                 self.add(&mut chosen, best);
             }
-            terms = self.looked_at_again(&mut chosen)?;
+            self.looked_at_again(&mut chosen, false)?;
             if chosen == before {
                 break;
             }
         }
+        let terms = self.looked_at_again(&mut chosen, true)?;
         let fit = self.fit(&chosen)?;
         Some(Found {
             catalogue: self.catalogue,
@@ -114,14 +115,16 @@ impl Search {
         chosen.push(candidate);
     }
 
-    /// Takes each term out and puts the best one in, until nothing changes; the terms with what they bring.
-    fn looked_at_again(&self, chosen: &mut Vec<usize>) -> Option<Vec<Term>> {
+    /// Takes each term out and puts the best one in; the terms with what they bring. Friction of several kinds at once is looked at last, with `compound`, and only
+    /// in joints that have friction already: its many values explain a little of anything.
+    fn looked_at_again(&self, chosen: &mut Vec<usize>, compound: bool) -> Option<Vec<Term>> {
         let mut terms = Vec::new();
         let mut place = 0;
         while place < chosen.len() {
             let mut others = chosen.clone();
             others.remove(place);
-            let ranked = self.ranked(&others)?;
+            let own = &self.catalogue.candidates[chosen[place]];
+            let ranked = self.ranked(&others, own.joint.filter(|_| compound && is_friction(own.effect)))?;
             match ranked.first().copied() {
                 Some((best, gain)) if gain > 0.0 => {
                     chosen[place] = best;
@@ -142,12 +145,13 @@ impl Search {
         Fit::new(&self.all, columns, &stddevs)
     }
 
-    /// All hypotheses that may join some, by ln of posterior odds, best first.
-    fn ranked(&self, chosen: &[usize]) -> Option<Vec<(usize, f64)>> {
+    /// All hypotheses that may join some, by ln of posterior odds, best first; friction of several kinds at once in one joint at most.
+    fn ranked(&self, chosen: &[usize], compound_in: Option<usize>) -> Option<Vec<(usize, f64)>> {
         let fit = self.fit(chosen)?;
         let spreads = stddevs(&self.catalogue, &fit.columns, self.mass_factor);
         let gain = |(place, candidate): (usize, &Candidate)| {
-            if !self.may_join(candidate, chosen) {
+            let compound = candidate.effect.is_compound_friction() && candidate.joint != compound_in;
+            if compound || !self.may_join(candidate, chosen) {
                 return None;
             }
             let new = candidate.features.iter().filter(|feature| !fit.columns.contains(feature));
@@ -298,7 +302,8 @@ fn everything(catalogue: &Catalogue) -> Vec<usize> {
         if candidate.effect.name == "torque_ripple" {
             return candidate.setting <= 4.0;
         }
-        alike[alike.len() / 2].setting == candidate.setting
+        let middle = alike[alike.len() / 2];
+        middle.setting == candidate.setting && middle.curvature == candidate.curvature
     };
     let chosen: Vec<usize> =
         (0..catalogue.candidates.len()).filter(|place| of(&catalogue.candidates[*place])).collect();

@@ -5,6 +5,7 @@
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use serde::Serialize;
 
+use crate::features::Candidate;
 use crate::fit::Fit;
 use crate::prepared::Prepared;
 use crate::search::{Found, Term, stddevs};
@@ -121,14 +122,10 @@ pub(crate) fn values(prepared: &Prepared, found: &Found, covariance: &DMatrix<f6
             interval90: [value - NINETY * stddev, value + NINETY * stddev],
         })
         .collect();
-    if let Some(parameter) = candidate.effect.parameters.get(values.len()) {
-        let [low, high] = settings(found, term);
-        values.push(Value {
-            name: parameter.name,
-            unit: unit(parameter.unit, slides),
-            value: candidate.setting,
-            interval90: [low, high],
-        });
+    let settings_of: [fn(&Candidate) -> f64; 2] = [|candidate| candidate.setting, |candidate| candidate.curvature];
+    for (parameter, of) in candidate.effect.parameters[values.len()..].iter().zip(settings_of) {
+        let unit = unit(parameter.unit, slides);
+        values.push(Value { name: parameter.name, unit, value: of(candidate), interval90: settings(found, term, of) });
     }
     values
 }
@@ -161,17 +158,17 @@ fn inverse(parameter: crate::effect::Parameter, slides: bool, value: f64, stddev
 }
 
 /// Settings whose evidence is within a factor of four, half way to the next ones.
-fn settings(found: &Found, term: &Term) -> [f64; 2] {
+fn settings(found: &Found, term: &Term, of: fn(&Candidate) -> f64) -> [f64; 2] {
     let all = &found.catalogue.candidates;
     let own = &all[term.candidate];
     let alike = |place: usize| all[place].effect.name == own.effect.name && all[place].joint == own.joint;
-    let mut grid: Vec<f64> = (0..all.len()).filter(|place| alike(*place)).map(|place| all[place].setting).collect();
+    let mut grid: Vec<f64> = (0..all.len()).filter(|place| alike(*place)).map(|place| of(&all[place])).collect();
     grid.sort_by(f64::total_cmp);
     let near = term.rivals.iter().filter(|(place, gain)| alike(*place) && term.gain - gain < 4.0_f64.ln());
-    let (mut low, mut high) = (own.setting, own.setting);
+    let (mut low, mut high) = (of(own), of(own));
     for (place, _) in near {
-        low = low.min(all[*place].setting);
-        high = high.max(all[*place].setting);
+        low = low.min(of(&all[*place]));
+        high = high.max(of(&all[*place]));
     }
     let below = grid.iter().copied().filter(|setting| *setting < low).fold(f64::NAN, f64::max);
     let above = grid.iter().copied().filter(|setting| *setting > high).fold(f64::NAN, f64::min);
