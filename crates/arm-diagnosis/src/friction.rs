@@ -3,7 +3,8 @@
 use crate::features::{Catalogue, read};
 use crate::prepared::Prepared;
 
-/// Of the Stribeck effect exp(−(v/v_s)^α): speeds v_s below which it shows, rad/s, and curvatures α. Servos have 1 to 2.5 (Duclusaud and Passault 2025).
+/// Of the Stribeck effect exp(−(v/v_s)^α): speeds v_s below which it shows, rad/s, and curvatures α.
+/// α is 2 in the usual form; the fits of Duclusaud and Passault (ICRA 2025) begin at 1.35.
 const STRIBECK_RPS: [f64; 6] = [0.01, 0.02, 0.04, 0.08, 0.16, 0.32];
 const CURVATURE: [f64; 2] = [1.25, 2.0];
 /// Spread of a share of load before the log is seen; of a quadratic one in units of the joint's typical torque.

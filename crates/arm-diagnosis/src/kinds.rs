@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use crate::effect::Effect;
 use crate::fit::Fit;
 use crate::group::is_friction;
 use crate::prepared::Prepared;
@@ -26,19 +25,17 @@ pub(crate) fn kinds(prepared: &Prepared, found: &Found, term: &Term) -> Vec<Kind
     let all = &found.catalogue.candidates;
     let own = &all[term.candidate];
     let Some(joint) = own.joint.filter(|_| is_friction(own.effect)) else { return Vec::new() };
-    // Best setting of each kind: rivals come best first.
-    let mut best: Vec<(&'static Effect, usize, f64)> = vec![(own.effect, term.candidate, term.gain)];
-    for (place, gain) in &term.rivals {
-        let rival = &all[*place];
-        if rival.joint == Some(joint) && is_friction(rival.effect) {
-            match best.iter_mut().find(|(effect, ..)| effect.name == rival.effect.name) {
-                Some(known) if known.2 >= *gain => {}
-                Some(known) => *known = (rival.effect, *place, *gain),
-                None => best.push((rival.effect, *place, *gain)),
-            }
-        }
-    }
-    let most = best.iter().map(|(.., gain)| *gain).fold(f64::NEG_INFINITY, f64::max);
+    let mut ranked: Vec<(usize, f64)> = term.rivals.iter().copied().chain([(term.candidate, term.gain)]).collect();
+    ranked.retain(|(place, _)| all[*place].joint == Some(joint) && is_friction(all[*place].effect));
+    ranked.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let most = ranked[0].1;
+    // The best setting of each kind.
+    let mut named = Vec::new();
+    ranked.retain(|(place, _)| {
+        let new = !named.contains(&all[*place].effect.name);
+        named.push(all[*place].effect.name);
+        new
+    });
     let others: Vec<usize> =
         found.terms.iter().map(|term| term.candidate).filter(|place| *place != term.candidate).collect();
     let heldout_rms_nm = |candidate: usize| -> Option<f64> {
@@ -50,11 +47,11 @@ pub(crate) fn kinds(prepared: &Prepared, found: &Found, term: &Term) -> Vec<Kind
         let (sum, count) = found.design.chi2(&left, &found.design.held_out, joint, 1.0);
         Some((sum / count.max(1) as f64).sqrt())
     };
-    let mut kinds: Vec<Kind> = best
+    let mut kinds: Vec<Kind> = ranked
         .into_iter()
-        .filter_map(|(effect, place, gain)| {
+        .filter_map(|(place, gain)| {
             Some(Kind {
-                name: effect.name,
+                name: all[place].effect.name,
                 values: all[place].features.len(),
                 log_evidence: gain - most,
                 heldout_rms_nm: heldout_rms_nm(place)?,

@@ -87,7 +87,7 @@ fn kinds(report: &Report) -> Markup {
         @if !rows.is_empty() {
             p {
                 "Kinds of friction side by side. Named is the simplest kind whose evidence is within a factor of twenty of the best, or which leaves less than 5 % more "
-                "of the squared error."
+                "of the squared error on the pieces that were fitted."
             }
             (table(&heads, &rows))
         }

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import copy
-import json
 import os
 import time
 from types import SimpleNamespace
@@ -23,6 +22,7 @@ import numpy as np  # noqa: E402
 
 import arm_models  # noqa: E402
 import effects  # noqa: E402
+from common import log_uniform, read_truth, write_truth  # noqa: E402
 from engine_mujoco import MujocoEngine, RigidModel  # noqa: E402
 from motions import draw_motion  # noqa: E402
 from scene import Friction, Scene  # noqa: E402
@@ -55,9 +55,9 @@ def draw_setup(seed: int, index: int, effect: str | None, arm_name: str | None) 
         "velocity_columns": bool(rng.random() < 2 / 3),
         "command_columns": bool(rng.random() < 2 / 3),
         "noise_stated": bool(rng.random() < 0.5),
-        "position_noise_rad": effects.log_uniform(rng, 1e-5, 3e-4),
-        "velocity_noise_rps": effects.log_uniform(rng, 1e-3, 1e-2),
-        "torque_noise_share": effects.log_uniform(rng, 0.003, 0.02),
+        "position_noise_rad": log_uniform(rng, 1e-5, 3e-4),
+        "velocity_noise_rps": log_uniform(rng, 1e-3, 1e-2),
+        "torque_noise_share": log_uniform(rng, 0.003, 0.02),
         "encoder_step_rad": float(2.0 * np.pi / 2.0 ** rng.integers(15, 21)) * float(rng.random() < 0.25),
         "frequency_share": rng.uniform(0.7, 1.3),
         "damping_ratio": rng.uniform(0.7, 1.0),
@@ -241,12 +241,7 @@ def main() -> None:
     parser.add_argument("--arm", choices=list(arm_models.CATALOGUE), help="this arm in all logs")
     options = parser.parse_args()
     engine_class = engine_of(options.engine)
-    os.makedirs(options.out, exist_ok=True)
-    truth_path = os.path.join(options.out, "truth.json")
-    truth = {}
-    if os.path.exists(truth_path):
-        with open(truth_path, encoding="utf-8") as file:
-            truth = json.load(file)
+    truth = read_truth(options.out)
     for index in range(options.first, options.first + options.logs):
         name = f"{index:04d}"
         folder = os.path.join(options.out, name)
@@ -259,9 +254,7 @@ def main() -> None:
             print(f"{name} left out: {error}", flush=True)
             continue
         truth[name] = copy.deepcopy(entry)
-        with open(truth_path + ".new", "w", encoding="utf-8") as file:
-            json.dump(truth, file, indent=1, sort_keys=True)
-        os.replace(truth_path + ".new", truth_path)
+        write_truth(options.out, truth)
         print(f"{name} {entry['arm']:6s} {entry['effect']:22s} {entry['joints']!s:10s} {entry['motion']:10s} "
               f"{entry['controller']:15s} visible {entry['visible']:10.3g} error {entry['tracking_rms_rad']:.4f} rad "
               f"tries {entry['attempts']} {time.perf_counter() - started:.1f} s", flush=True)

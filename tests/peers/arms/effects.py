@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from arm_models import Arm, merge
+from common import log_uniform
 from engine_mujoco import RigidModel
 from scene import Cable, Elastic, Friction, Scene, Table
 from simulate import Sensing
@@ -64,10 +65,6 @@ def sizes_of(model: RigidModel, q, v, a, log_secs: float) -> Sizes:
     size.effective, size.effective_mean = effective.min(axis=0), effective.mean(axis=0)
     size.rms, size.v_rms, size.a_rms = (np.sqrt((x**2).mean(axis=0)) for x in (torque, v, a))
     return size
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def draw_friction(size: Sizes, i: int, rng: np.random.Generator, low=0.02, high=0.15) -> tuple[float, float]:

@@ -1,10 +1,11 @@
 """Logs of a simulated servo that swings a weight, with one of six friction laws that the URDF lacks.
 
-    python ladder_logs.py --out DIR --seed 1 --logs 60 [--first K] [--noise-share 0.01]
+    python ladder_logs.py --out DIR --seed 1 --logs 60 [--first K] [--noise-share 0.01] [--published]
 
 The laws are the rungs M1 to M6 of Duclusaud and Passault, "Extended friction models for the physics simulation of servo
-actuators" (ICRA 2025), with the torque that the gear passes on in place of the difference of motor and external torque:
-Coulomb and viscous; Stribeck; with load; both; with a share of load that depends on who drives whom; and quadratic in load.
+actuators" (ICRA 2025): Coulomb and viscous; Stribeck; with load; both; by direction; and quadratic in load.  By default load
+is the torque that the gear passes on, with one share where the motor drives and another where the load does.  With
+--published it is what they publish: |K_e external torque - K_m motor torque|.
 Log K has rung 1 + K mod 6.  Each log is a folder DIR/NNNN with log.toml, samples.csv and robot.urdf; the truth goes to
 DIR/truth.json.  The integration is this file's own: no engine.  SI units, radians.
 """
@@ -12,20 +13,17 @@ DIR/truth.json.  The integration is this file's own: no engine.  SI units, radia
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import os
 
 import numpy as np
 
+from common import log_uniform, read_truth, write_truth
+
 GRAVITY = 9.81
 STEP_SECS = 0.00025
 RATE_HZ = 500
 RUNGS = ["M1", "M2", "M3", "M4", "M5", "M6"]
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def draw_law(rng: np.random.Generator, rung: int, torque: float, rate: float) -> dict:
@@ -51,9 +49,29 @@ def draw_law(rng: np.random.Generator, rung: int, torque: float, rate: float) ->
     return law
 
 
-def level(law: dict, v: float, passed: float) -> float:
-    """Largest friction [N m] at a rate and a torque that the gear passes on to the link."""
+def draw_published(rng: np.random.Generator, rung: int, torque: float, rate: float) -> dict:
+    """The same with shares of motor and external torque, which add up to what a load is multiplied by."""
+    law = draw_law(rng, rung, torque, rate)
+    law["motor"] = law["external"] = law["driving"] / 2
+    law["motor_peak"] = law["external_peak"] = law["driving_peak"] / 2
+    if rung >= 5:
+        for key in ("external", "external_peak"):
+            law[key] *= rng.uniform(0.0, 0.5)
+        for key in ("motor", "motor_peak"):
+            law[key] *= 1.5
+    law["square"] = law["driving_square"]
+    return law
+
+
+def level(law: dict, v: float, passed: float, motor: float, external: float) -> float:
+    """Largest friction [N m] at a rate, a torque that the gear passes on to the link, and torques of motor and load."""
     slow = math.exp(-((abs(v) / law["stribeck"]) ** law["curvature"]))
+    if "motor" in law:
+        load = abs(external * law["external"] - motor * law["motor"])
+        load_peak = abs(external * law["external_peak"] - motor * law["motor_peak"])
+        against = external * motor < 0.0
+        square = law["square"] * min(external * external, motor * motor) if against else 0.0
+        return law["coulomb"] + law["viscous"] * abs(v) + load + slow * (law["peak"] + load_peak + square)
     way = "driving" if passed * v >= 0.0 else "driven"
     size = abs(passed)
     return (law["coulomb"] + law["viscous"] * abs(v) + law[way] * size
@@ -99,7 +117,7 @@ def simulate(law: dict, load: float, inertia: float, rotor: float, command: np.n
         for _ in range(int(round(0.001 / STEP_SECS))):
             gravity = load * math.sin(q)
             free = v + STEP_SECS * (motor - gravity) / whole
-            most = STEP_SECS * level(law, v if v else free, passed) / whole
+            most = STEP_SECS * level(law, v if v else free, passed, motor, -gravity) / whole
             new = free - min(max(free, -most), most)
             # the gear passes on what moves the link
             passed = gravity + inertia * (new - v) / STEP_SECS
@@ -117,14 +135,14 @@ def write_urdf(path: str, mass: float, place: float, inertia: float) -> None:
                    '<axis xyz="0 -1 0"/><limit lower="-3" upper="3" effort="100" velocity="20"/></joint></robot>\n')
 
 
-def make_log(folder: str, seed: int, index: int, noise_share: float) -> dict:
+def make_log(folder: str, seed: int, index: int, noise_share: float, published: bool) -> dict:
     rng = np.random.default_rng([seed, index])
     rung = 1 + index % 6
     mass, place = log_uniform(rng, 0.3, 5.0), rng.uniform(0.1, 0.3)
     about_centre = mass * (0.2 * place) ** 2
     inertia, load = about_centre + mass * place**2, mass * GRAVITY * place
     rotor = inertia * rng.uniform(0.05, 0.3)
-    law = draw_law(rng, rung, 0.5 * load, 0.5)
+    law = (draw_published if published else draw_law)(rng, rung, 0.5 * load, 0.5)
     os.makedirs(folder, exist_ok=True)
     wrong = 1.0 + rng.uniform(-0.05, 0.05)
     write_urdf(os.path.join(folder, "robot.urdf"), mass * wrong, place + rng.uniform(-0.003, 0.003),
@@ -153,21 +171,16 @@ def main() -> None:
     parser.add_argument("--logs", type=int, default=60)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--noise-share", type=float, default=0.005, help="of torque readings, of m g l")
+    parser.add_argument("--published", action="store_true", help="load as the paper has it")
     options = parser.parse_args()
-    os.makedirs(options.out, exist_ok=True)
-    path = os.path.join(options.out, "truth.json")
-    truth = {}
-    if os.path.exists(path):
-        with open(path, encoding="utf-8") as file:
-            truth = json.load(file)
+    truth = read_truth(options.out)
     for index in range(options.first, options.first + options.logs):
         name = f"{index:04d}"
         if name in truth:
             continue
-        truth[name] = make_log(os.path.join(options.out, name), options.seed, index, options.noise_share)
-        with open(path + ".new", "w", encoding="utf-8") as file:
-            json.dump(truth, file, indent=1, sort_keys=True)
-        os.replace(path + ".new", path)
+        truth[name] = make_log(os.path.join(options.out, name), options.seed, index, options.noise_share,
+                               options.published)
+        write_truth(options.out, truth)
         print(name, truth[name]["rung"], flush=True)
 
 
