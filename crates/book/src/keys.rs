@@ -131,9 +131,13 @@ fn keys(schema: &Value) -> Vec<Key> {
     found
 }
 
-/// The node that `node` refers to, or itself.
+/// The node that `node` refers to, or itself. A table that may be left out is `anyOf` of it and null.
 fn target<'a>(schema: &'a Value, node: &'a Value) -> &'a Value {
-    let wrapped = node.get("allOf").and_then(|all| all.get(0)).unwrap_or(node);
+    let optional = match node["anyOf"].as_array().map(Vec::as_slice) {
+        Some([table, null]) if null["type"] == "null" => Some(table),
+        _ => None,
+    };
+    let wrapped = node.get("allOf").and_then(|all| all.get(0)).or(optional).unwrap_or(node);
     let name = wrapped.get("$ref").and_then(Value::as_str).and_then(|path| path.rsplit('/').next());
     name.map_or(node, |name| &schema["definitions"][name])
 }

@@ -5,7 +5,7 @@ use crate::{Choice, Error};
 /// Settings of [`crate::Pomcp`] and [`crate::Pomcpow`].
 ///
 /// Start from [`Config::default`] and change what your problem needs. [`crate::Planner::new`] checks every value. With the feature `serde` a
-/// file of settings has to name every key but `backup`, `choice` and `branch_states`: a missing key is an error and does not fall back to the default.
+/// file of settings has to name every key but `backup`, `choice`, `branch_states` and `early_stop`: another missing key is an error and does not fall back to the default.
 ///
 /// # Defaults
 ///
@@ -20,6 +20,7 @@ use crate::{Choice, Error};
 /// | `backup` | `Mean` | As published, and the better one where rollouts are informative. |
 /// | `choice` | `HighestMean` | As published for POMCP. `MostVisits` is safer where returns are noisy. |
 /// | `branch_states` | 0 | As published for POMCPOW. Some make rollouts believable where a policy knows what to do with a belief. |
+/// | `early_stop` | none | The whole budget is spent, so that runs compare at equal work. |
 /// | `nodes` | 1,000,000 | About 16 MB per action of the model. More than a budget of some thousand simulations ever fills. |
 /// | `trees` | 1 | One tree learns most from a given budget; more trees pay where they run on threads of their own. |
 /// | `threads` | 1 | The caller decides how many cores are its own. |
@@ -71,6 +72,9 @@ pub struct Config {
     /// without this key means, a branch starts with the state of its simulation, and rollouts see the state.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
     pub branch_states: usize,
+    /// When a search may end before its budget is spent. Without this key it never does.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
+    pub early_stop: Option<EarlyStop>,
     /// Most nodes of all trees together, at least one per tree. States stored by progressive widening count as nodes.
     /// When the nodes are used up, the tree stops growing: simulations that leave it continue as rollouts, and
     /// [`crate::SearchReport::unexpanded`] counts them. Pruning frees nodes.
@@ -98,6 +102,25 @@ pub enum Budget {
     /// Wall-clock time, ms. No simulation starts later, and every tree makes at least one. For live use only: the same
     /// seed may give another result.
     Milliseconds(u64),
+}
+
+/// Ends a search that has little left to gain.
+///
+/// The budget is spent in `rounds` equal parts. After each, the search ends if exact values of all actions could be expected to add at most `gain` to
+/// the decision. This is the largest expected improvement E[max(0, V(a) − V(best))] of another legal action, for a difference that is normal about that
+/// of the mean returns. The standard error of a mean is the standard deviation of an action's returns at the root in this search over √N(ha);
+/// actions with few returns borrow from the spread of all. So a search ends where one action is clearly the best, and also where several are
+/// equally good. Such a value of information as a rule to stop is that of Hay, Russell, Tolpin and Shimony, "Selecting computations: theory and
+/// applications" (UAI 2012). Returns of one tree are not independent, as the tree learns: the figure is an estimate, not a bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct EarlyStop {
+    /// Equal parts of the budget. At least 2.
+    pub rounds: usize,
+    /// Expected improvement that is too small to search on for, in units of reward. Positive.
+    pub gain: f64,
 }
 
 /// Constant c of UCB1.
@@ -193,6 +216,7 @@ impl Default for Config {
             backup: Backup::Mean,
             choice: Choice::HighestMean,
             branch_states: 0,
+            early_stop: None,
             nodes: 1_000_000,
             trees: 1,
             threads: 1,
@@ -257,6 +281,13 @@ impl Config {
         Self { branch_states, ..self }
     }
 
+    /// Ends a search before its budget is spent where exact values could be expected to add at most `gain` (positive, in units of reward), which is
+    /// asked after each of `rounds` parts of the budget (at least 2). Start with 6 rounds and a hundredth of a typical return.
+    #[must_use]
+    pub fn with_early_stop(self, rounds: usize, gain: f64) -> Self {
+        Self { early_stop: Some(EarlyStop { rounds, gain }), ..self }
+    }
+
     /// Most nodes of all trees together. At least one a tree.
     #[must_use]
     pub fn with_nodes(self, nodes: usize) -> Self {
@@ -301,6 +332,11 @@ impl Config {
         let nodes = self.nodes;
         let limit = format!("at least trees = {trees}, at most 2³²");
         require(nodes >= trees && nodes as u64 <= 1 << 32, "nodes", &nodes, limit)?;
+        if let Some(EarlyStop { rounds, gain }) = self.early_stop {
+            require((2..=1000).contains(&rounds), "early_stop.rounds", &rounds, "between 2 and 1000")?;
+            let positive = gain.is_finite() && gain > 0.0;
+            require(positive, "early_stop.gain", &gain, "finite and positive")?;
+        }
         if let Observations::Widening { factor, exponent } = self.observations {
             let positive = factor.is_finite() && factor > 0.0;
             require(positive, "observations.widening.factor", &factor, "finite and positive")?;
@@ -391,13 +427,14 @@ mod tests {
 
     #[test]
     fn a_config_survives_writing_and_reading() {
-        let other = Config { choice: Choice::MostVisits, branch_states: 7, ..config() };
+        let early_stop = Some(EarlyStop { rounds: 4, gain: 2.5 });
+        let other = Config { choice: Choice::MostVisits, branch_states: 7, early_stop, ..config() };
         for config in [config(), other] {
             assert_eq!(toml::from_str::<Config>(&toml::to_string(&config).unwrap()).unwrap(), config);
         }
         // What has its default is not written: files that were written before these keys came stay as they are.
         let text = toml::to_string(&config()).unwrap();
-        assert!(!text.contains("choice") && !text.contains("branch_states"), "{text}");
+        assert!(!["choice", "branch_states", "early_stop"].iter().any(|key| text.contains(key)), "{text}");
     }
 
     #[test]
@@ -422,7 +459,7 @@ mod tests {
         };
         assert_eq!(config().validate(), Ok(()));
         type Change = fn(&mut Config);
-        let expected: [(Change, &str); 11] = [
+        let expected: [(Change, &str); 13] = [
             (|c| c.depth = 0, "`depth` is 0, but must be at least 1"),
             (|c| c.trees = 0, "`trees` is 0, but must be at least 1"),
             (|c| c.threads = 0, "`threads` is 0, but must be at least 1"),
@@ -448,6 +485,8 @@ mod tests {
                 |c| c.observations = Observations::Widening { factor: 1.0, exponent: 1.5 },
                 "`observations.widening.exponent` is 1.5, but must be between 0 and 1",
             ),
+            (|c| *c = config().with_early_stop(1, 3.0), "`early_stop.rounds` is 1, but must be between 2 and 1000"),
+            (|c| *c = config().with_early_stop(4, 0.0), "`early_stop.gain` is 0, but must be finite and positive"),
             (
                 |c| c.exploration = Exploration::Fixed(f64::NAN),
                 "`exploration.fixed` is NaN, but must be finite and not negative",
@@ -478,6 +517,8 @@ mod tests {
         assert_eq!(d().with_backup(Backup::Watkins), Config { backup: Backup::Watkins, ..d() });
         assert_eq!(d().with_choice(Choice::MostVisits), Config { choice: Choice::MostVisits, ..d() });
         assert_eq!(d().with_branch_states(9), Config { branch_states: 9, ..d() });
+        let early_stop = Some(EarlyStop { rounds: 6, gain: 3.0 });
+        assert_eq!(d().with_early_stop(6, 3.0), Config { early_stop, ..d() });
         assert_eq!(d().with_nodes(50), Config { nodes: 50, ..d() });
         assert_eq!(d().with_trees(4, 2), Config { trees: 4, threads: 2, ..d() });
     }

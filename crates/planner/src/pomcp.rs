@@ -7,8 +7,9 @@ use pomdp::{Belief, Discretise, GenerativeModel, Policy, Rng};
 
 use crate::branching::{Branching, Export};
 use crate::export::{self, ExportLimit, TreeNode};
-use crate::nodes::NodeId;
-use crate::simulate::{Search, Share};
+use crate::gain::{Moments, open_gain};
+use crate::nodes::{NodeId, Slot};
+use crate::simulate::{Progress, Search, Share, Tally};
 use crate::tree::KeyTree;
 use crate::ucb::{self, ActionStats};
 use crate::widening::TreeOf;
@@ -56,6 +57,8 @@ pub enum Stop {
     Transitions,
     /// Time was up.
     Time,
+    /// Little was left to gain: [`crate::EarlyStop`].
+    LittleToGain,
 }
 
 /// What one search found and what it cost, all trees together.
@@ -134,19 +137,29 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
         let reused = self.trees.iter().map(|(tree, _)| tree.nodes().visits(NodeId::ROOT)).sum();
         let depth = config.depth.min(remaining_horizon);
 
-        let tallies = parallel::for_each(&mut self.trees, config.threads, rng, |index, (tree, root), rng| {
-            let fresh = std::mem::replace(root, Root::Known) == Root::Fresh;
-            Search::new(model, policy, config, tree, depth).run(belief, fresh, Share::of(config, index), rng)
+        let started = self.trees.iter_mut().map(|entry| {
+            let progress = Progress::new(entry.0.nodes().slots(NodeId::ROOT));
+            (entry, progress)
         });
-
-        let mut stats = vec![ActionStats::default(); self.actions.len()];
-        for (tree, _) in &self.trees {
-            for (merged, slot) in stats.iter_mut().zip(tree.nodes().slots(NodeId::ROOT)) {
-                merged.merge(slot.stats());
+        let mut started: Vec<_> = started.collect();
+        let rounds = config.early_stop.map_or(1, |early| early.rounds);
+        let mut enough = false;
+        for round in 0..rounds {
+            parallel::for_each(&mut started, config.threads, rng, |index, ((tree, root), progress), rng| {
+                let fresh = std::mem::replace(root, Root::Known) == Root::Fresh;
+                let share = Share::of(config, index, round, rounds);
+                Search::new(model, policy, config, tree, depth, progress).run(belief, fresh, share, rng);
+            });
+            enough = round + 1 < rounds && enough_is_known(config, &started);
+            if enough {
+                break;
             }
         }
+        let tallies: Vec<Tally> = started.into_iter().map(|(_, progress)| progress.tally).collect();
+
+        let stats = merged(self.trees.iter().map(|(tree, _)| tree.nodes().slots(NodeId::ROOT)));
         let best = ucb::best(&stats, config.choice).expect("a valid budget affords at least one simulation");
-        let sum = |count: fn(&crate::simulate::Tally) -> usize| tallies.iter().map(count).sum();
+        let sum = |count: fn(&Tally) -> usize| tallies.iter().map(count).sum();
         let report = SearchReport {
             action: self.actions[best].clone(),
             actions: stats,
@@ -160,6 +173,7 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
             unexpanded: sum(|t| t.unexpanded),
             exploration: tallies.iter().map(|t| t.exploration).sum::<f64>() / tallies.len() as f64,
             stop: match config.budget {
+                _ if enough => Stop::LittleToGain,
                 Budget::Simulations(_) => Stop::Simulations,
                 Budget::Transitions(_) => Stop::Transitions,
                 Budget::Milliseconds(_) => Stop::Time,
@@ -183,6 +197,32 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
         let limit = crate::config::share(self.config.nodes, self.config.trees, index);
         (T::new(&self.config, self.actions.len(), limit), Root::Fresh)
     }
+}
+
+/// Statistics of the root's actions over all trees, each given by the slots of its root.
+fn merged<'a>(roots: impl Iterator<Item = &'a [Slot]>) -> Vec<ActionStats> {
+    let mut stats = Vec::new();
+    for root in roots {
+        stats.resize(root.len(), ActionStats::default());
+        for (merged, slot) in stats.iter_mut().zip(root) {
+            merged.merge(slot.stats());
+        }
+    }
+    stats
+}
+
+/// Whether the search may end here: [`crate::EarlyStop`].
+fn enough_is_known<M: GenerativeModel, T: Branching<M>>(config: &Config, trees: &[(&mut (T, Root), Progress)]) -> bool {
+    let Some(early) = config.early_stop else { return false };
+    let roots = || trees.iter().map(|(entry, _)| entry.0.nodes().slots(NodeId::ROOT));
+    let stats = merged(roots());
+    let Some(best) = ucb::best(&stats, config.choice) else { return false };
+    let mut returns = vec![Moments::default(); stats.len()];
+    for (_, progress) in trees {
+        returns.iter_mut().zip(&progress.returns).for_each(|(merged, own)| merged.merge(*own));
+    }
+    let legal: Vec<bool> = (0..stats.len()).map(|action| roots().any(|root| root[action].legal())).collect();
+    open_gain(&stats, &returns, &legal, best) <= early.gain
 }
 
 impl<M: GenerativeModel, T: Export> Planner<M, T> {

@@ -6,10 +6,28 @@ use pomdp::{ActionPrior, Belief, GenerativeModel, Outcome, Policy, Rng};
 
 use crate::branching::{Branching, Next};
 use crate::config::share;
-use crate::nodes::NodeId;
+use crate::gain::Moments;
+use crate::nodes::{NodeId, Slot};
 use crate::rollout::Span;
 use crate::ucb::{self, ReturnRange};
 use crate::{ActionPriors, Backup, Budget, Config};
+
+/// What one search did in one tree so far.
+#[derive(Debug)]
+pub(crate) struct Progress {
+    pub(crate) tally: Tally,
+    /// Returns of the root's actions.
+    pub(crate) returns: Vec<Moments>,
+    range: ReturnRange,
+}
+
+impl Progress {
+    /// Before the first simulation in a tree with these statistics at its root.
+    pub(crate) fn new(root: &[Slot]) -> Self {
+        let returns = vec![Moments::default(); root.len()];
+        Self { tally: Tally::default(), returns, range: ReturnRange::of_means(root) }
+    }
+}
 
 /// What the simulations of one tree cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,14 +61,17 @@ pub(crate) enum Share {
 }
 
 impl Share {
-    /// The part of tree number `index` in the configured budget, from now on.
-    pub(crate) fn of(config: &Config, index: usize) -> Self {
+    /// The part of tree number `index` in the configured budget up to the end of round number `round` of `rounds`. A time is that of this
+    /// round, from now on.
+    pub(crate) fn of(config: &Config, index: usize, round: usize, rounds: usize) -> Self {
+        // All of `n` after the last round. In 128 bits, as both factors may be large.
+        let part = |n: usize| (share(n, config.trees, index) as u128 * (round + 1) as u128 / rounds as u128) as usize;
         match config.budget {
-            Budget::Simulations(n) => Self::Simulations(share(n, config.trees, index)),
-            Budget::Transitions(n) => Self::Transitions(share(n, config.trees, index)),
+            Budget::Simulations(n) => Self::Simulations(part(n)),
+            Budget::Transitions(n) => Self::Transitions(part(n)),
             Budget::Milliseconds(n) => {
                 // Threads take the trees in turns; a turn lasts as long for every tree.
-                let turns = config.trees.div_ceil(config.threads.min(config.trees));
+                let turns = config.trees.div_ceil(config.threads.min(config.trees)) * rounds;
                 let turn = Duration::from_millis(n) / u32::try_from(turns).unwrap_or(u32::MAX);
                 #[expect(
                     clippy::disallowed_methods,
@@ -86,7 +107,7 @@ pub(crate) struct Search<'a, M: GenerativeModel, P: ?Sized, T> {
     /// Node, action and reward of each step inside the tree; kept to spare an allocation per simulation.
     path: Vec<(NodeId, usize, f64)>,
     priors: Vec<ActionPrior>,
-    tally: Tally,
+    progress: &'a mut Progress,
 }
 
 impl<'a, M, P, T> Search<'a, M, P, T>
@@ -95,27 +116,34 @@ where
     P: Policy<M> + ?Sized,
     T: Branching<M>,
 {
-    pub(crate) fn new(model: &'a M, policy: &'a P, config: &'a Config, tree: &'a mut T, depth: usize) -> Self {
+    pub(crate) fn new(
+        model: &'a M,
+        policy: &'a P,
+        config: &'a Config,
+        tree: &'a mut T,
+        depth: usize,
+        progress: &'a mut Progress,
+    ) -> Self {
         let priors = vec![ActionPrior::default(); tree.nodes().actions()];
-        Self { model, policy, config, tree, depth, path: Vec::new(), priors, tally: Tally::default() }
+        Self { model, policy, config, tree, depth, path: Vec::new(), priors, progress }
     }
 
     /// Simulates from `belief` until the share is used up. `fresh` says that the root was not reached by a simulation yet.
-    pub(crate) fn run<B>(mut self, belief: &B, fresh: bool, share: Share, rng: &mut Rng) -> Tally
+    pub(crate) fn run<B>(mut self, belief: &B, fresh: bool, share: Share, rng: &mut Rng)
     where
         B: Belief<State = M::State> + ?Sized,
     {
-        let mut returns = ReturnRange::of_means(self.tree.nodes().slots(NodeId::ROOT));
         self.tree.begin(|| belief.sample(rng).clone());
-        while share.affords(&self.tally, self.depth) {
-            self.tally.exploration = self.config.exploration.constant(returns);
+        while share.affords(&self.progress.tally, self.depth) {
+            self.progress.tally.exploration = self.config.exploration.constant(self.progress.range);
             let state = belief.sample(rng).clone();
-            if fresh && self.tally.simulations == 0 {
+            if fresh && self.progress.tally.simulations == 0 {
                 self.set_priors(NodeId::ROOT, &state);
             }
-            returns.include(self.simulate(state, rng));
+            let discounted_return = self.simulate(state, rng);
+            self.progress.range.include(discounted_return);
+            self.progress.returns[self.path[0].1].record(discounted_return);
         }
-        self.tally
     }
 
     /// One simulation from `state`: down the tree, one new leaf, a rollout, and the returns back up. Returns that of the root.
@@ -124,11 +152,11 @@ where
         let mut tail = 0.0;
         self.path.clear();
         loop {
-            let action = ucb::select(self.tree.nodes().slots(node), self.tally.exploration, rng);
+            let action = ucb::select(self.tree.nodes().slots(node), self.progress.tally.exploration, rng);
             let mut step = self.model.step(&mut state, &self.model.actions()[action], rng);
             if step.outcome != Outcome::Continue || self.path.len() + 1 == self.depth {
                 self.path.push((node, action, step.reward));
-                self.tally.end(step.outcome);
+                self.progress.tally.end(step.outcome);
                 break;
             }
             let next = self.tree.follow(self.model, node, action, &mut state, &mut step, rng);
@@ -139,21 +167,21 @@ where
                     let leaf = if let Next::New(child) = next { Some(child) } else { None };
                     match leaf {
                         Some(child) => self.set_priors(child, &state),
-                        None => self.tally.unexpanded += 1,
+                        None => self.progress.tally.unexpanded += 1,
                     }
                     let left = self.depth - self.path.len();
                     let span = Span { actions: self.config.rollout_depth.actions(left), left };
                     let below = self.tree.rollout(self.model, self.policy, &mut state, leaf, span, rng);
-                    self.tally.end(below.outcome);
-                    self.tally.transitions += below.transitions;
+                    self.progress.tally.end(below.outcome);
+                    self.progress.tally.transitions += below.transitions;
                     tail = below.discounted_return;
                     break;
                 }
             }
         }
-        self.tally.simulations += 1;
-        self.tally.transitions += self.path.len();
-        self.tally.depth = self.tally.depth.max(self.path.len());
+        self.progress.tally.simulations += 1;
+        self.progress.tally.transitions += self.path.len();
+        self.progress.tally.depth = self.progress.tally.depth.max(self.path.len());
         self.back_up(tail)
     }
 

@@ -145,6 +145,28 @@ fn trees_share_the_budget_and_their_number_of_threads_changes_nothing() {
 }
 
 #[test]
+fn a_search_ends_early_where_little_is_left_to_gain_and_spends_its_budget_where_actions_tie() {
+    let run = |rewards, budget, threads| {
+        let config = Config { trees: 3, threads, ..config(budget, 3) }.with_early_stop(5, 1e-6);
+        let mut planner = Pomcp::new(config).unwrap();
+        planner.search(&Noise::new(rewards), &START, &UniformPolicy, 3, &mut rng(0))
+    };
+    for (budget, all) in
+        [(Budget::Simulations(1000), Stop::Simulations), (Budget::Transitions(3000), Stop::Transitions)]
+    {
+        let clear = run([1.0, 9.0, 1.0], budget, 1);
+        assert_eq!((clear.action, clear.stop), (1, Stop::LittleToGain));
+        assert!((150..=200).contains(&clear.simulations), "the first of five rounds: {}", clear.simulations);
+        assert_eq!(run([1.0, 9.0, 1.0], budget, 2), clear);
+        let open = run([1.1, 1.1, 0.9], budget, 1);
+        assert_eq!(open.stop, all);
+        assert!(open.transitions >= 3000 - 3 * 3, "all rounds: {}", open.transitions);
+    }
+    // A round that affords no simulation settles nothing.
+    assert_eq!(run([1.0, 9.0, 1.0], Budget::Simulations(3), 1).simulations, 3);
+}
+
+#[test]
 fn merged_values_are_the_means_of_all_returns() {
     // Rewards of an action do not vary at depth 1, so merging must give them exactly, whatever the visits of each tree.
     let config = Config { trees: 4, threads: 2, ..config(Budget::Simulations(401), 1) };

@@ -1,0 +1,151 @@
+//! What a decision could still gain from more simulations.
+
+use crate::ActionStats;
+
+/// Count, mean and spread of returns (Welford 1962).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Moments {
+    count: u64,
+    mean: f64,
+    /// Sum of squared deviations from the mean.
+    squares: f64,
+}
+
+impl Moments {
+    pub(crate) fn record(&mut self, value: f64) {
+        self.count += 1;
+        let before = value - self.mean;
+        self.mean += before / self.count as f64;
+        self.squares += before * (value - self.mean);
+    }
+
+    /// Takes in the returns of another tree (Chan, Golub and LeVeque 1979).
+    pub(crate) fn merge(&mut self, other: Self) {
+        if other.count == 0 {
+            return;
+        }
+        let (ours, theirs) = (self.count as f64, other.count as f64);
+        let apart = other.mean - self.mean;
+        self.count += other.count;
+        self.mean += apart * theirs / self.count as f64;
+        self.squares += other.squares + apart * apart * ours * theirs / self.count as f64;
+    }
+
+    fn freedom(self) -> f64 {
+        self.count.saturating_sub(1) as f64
+    }
+}
+
+/// Degrees of freedom that an action borrows from the spread of all actions: a handful of equal returns is no proof of a spread of zero.
+const BORROWED: f64 = 4.0;
+
+/// The most that exact values could be expected to add to a decision for the action `best`: the largest expected improvement of any other
+/// legal action, E[max(0, V(a) − V(best))], where the difference is normal about the difference of means with its standard error. It is a bound
+/// for pairs, in units of reward. Infinite where a legal action is untried or nothing is known of the spread. `legal` says which actions are.
+pub(crate) fn open_gain(stats: &[ActionStats], returns: &[Moments], legal: &[bool], best: usize) -> f64 {
+    let freedom: f64 = returns.iter().map(|r| r.freedom()).sum();
+    if freedom == 0.0 {
+        return f64::INFINITY;
+    }
+    let pooled = returns.iter().map(|r| r.squares).sum::<f64>() / freedom;
+    // Of a mean, squared.
+    let error = |action: usize| {
+        let own = returns[action];
+        let variance = (own.squares + BORROWED * pooled) / (own.freedom() + BORROWED);
+        variance / stats[action].visits as f64
+    };
+    let others = (0..stats.len()).filter(|&action| action != best && legal[action]);
+    let gains = others.map(|action| match stats[action].visits {
+        0 => f64::INFINITY,
+        _ => expected_improvement(stats[best].value - stats[action].value, (error(best) + error(action)).sqrt()),
+    });
+    gains.fold(0.0, f64::max)
+}
+
+/// E[max(0, X)] of a normal X with mean −`lead` and the standard deviation `error`.
+fn expected_improvement(lead: f64, error: f64) -> f64 {
+    if error == 0.0 {
+        return (-lead).max(0.0);
+    }
+    let z = lead / error;
+    let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    // Φ(−z), with libm's erfc.
+    error * density - lead * 0.5 * libm::erfc(z / std::f64::consts::SQRT_2)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn of(values: &[f64]) -> Moments {
+        let mut moments = Moments::default();
+        values.iter().for_each(|&value| moments.record(value));
+        moments
+    }
+
+    fn stats(returns: &[Moments]) -> Vec<ActionStats> {
+        returns.iter().map(|r| ActionStats { visits: r.count, value: r.mean }).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn moments_are_those_of_the_values_in_one_part_or_two(
+            values in prop::collection::vec(-100.0_f64..100.0, 2..40), cut in 0_usize..40,
+        ) {
+            let (n, cut) = (values.len() as f64, cut.min(values.len()));
+            let mean = values.iter().sum::<f64>() / n;
+            let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
+            let mut merged = of(&values[..cut]);
+            merged.merge(of(&values[cut..]));
+            for moments in [of(&values), merged] {
+                prop_assert_eq!(moments.count, values.len() as u64);
+                prop_assert!((moments.mean - mean).abs() < 1e-9);
+                prop_assert!((moments.squares - squares).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn the_expected_improvement_is_that_of_a_normal_difference() {
+        // E[max(0, X)] by the midpoint rule, X normal with mean −lead.
+        let numeric = |lead: f64, error: f64| {
+            let step = 1e-3;
+            let density =
+                |x: f64| (-0.5 * ((x + lead) / error).powi(2)).exp() / (error * (2.0 * std::f64::consts::PI).sqrt());
+            (0..60_000).map(|i| (i as f64 + 0.5) * step).map(|x| x * density(x) * step).sum::<f64>()
+        };
+        for (lead, error) in [(0.0, 1.0), (2.0, 1.0), (1.0, 3.0), (-1.5, 2.0)] {
+            let (found, expected) = (expected_improvement(lead, error), numeric(lead, error));
+            assert!((found - expected).abs() < 1e-6, "{lead} ± {error}: {found}, expected {expected}");
+        }
+        assert_eq!((expected_improvement(1.0, 0.0), expected_improvement(-1.0, 0.0)), (0.0, 1.0));
+    }
+
+    #[test]
+    fn the_open_gain_is_that_of_the_closest_action() {
+        // Eight returns each, with a spread of 1: a variance of 8/7 each, so a standard error of 0.535 of the difference.
+        let spread = |mean: f64| of(&[mean - 1.0, mean + 1.0].repeat(4));
+        let returns = [spread(10.0), spread(9.0), spread(5.0)];
+        let gain = open_gain(&stats(&returns), &returns, &[true; 3], 0);
+        assert!((gain - expected_improvement(1.0, (2.0_f64 / 7.0).sqrt())).abs() < 1e-12, "{gain}");
+    }
+
+    #[test]
+    fn an_untried_legal_action_leaves_a_decision_open_and_an_illegal_one_does_not() {
+        let returns = [of(&[10.0, 10.1]), of(&[]), of(&[1.0, 1.1])];
+        let gain = |legal: [bool; 3]| open_gain(&stats(&returns), &returns, &legal, 0);
+        assert_eq!(gain([true; 3]), f64::INFINITY);
+        assert!(gain([true, false, true]) < 1e-9);
+    }
+
+    #[test]
+    fn equal_returns_of_one_action_do_not_hide_the_spread_of_the_others() {
+        let wide: Vec<f64> = (0..20).map(|i| if i % 2 == 0 { 60.0 } else { -60.0 }).collect();
+        let returns = [of(&[12.0, 12.0, 12.0]), of(&wide)];
+        assert!(open_gain(&stats(&returns), &returns, &[true; 2], 0) > 1.0);
+        let unknown = open_gain(&stats(&returns[..1]), &[Moments::default()], &[true], 0);
+        assert_eq!(unknown, f64::INFINITY, "nothing was simulated");
+    }
+}
