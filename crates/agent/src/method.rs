@@ -53,6 +53,7 @@ impl FromStr for Method {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
+        let text = text.trim();
         Self::ALL.into_iter().find(|m| m.name() == text).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|m| m.name()).collect();
             format!("unknown method `{text}`: expected one of {}", known.join(", "))

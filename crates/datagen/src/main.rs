@@ -19,7 +19,7 @@ use scenario::Selection;
 #[derive(Debug, Parser)]
 #[command(name = "datagen", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer or jaco.
+    /// Arm: sawyer, jaco, or a robot file.
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Transitions to generate [default: 150000 for sawyer, 200000 for jaco, 8000 with --quick].
@@ -115,15 +115,15 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let manifest = job.finish().context(FAILED)?;
     job.print(&manifest, &missing, started.elapsed().as_secs_f64(), arguments.json);
     if !arguments.json {
-        suggest_train(&job, arguments.quick);
+        suggest_train(&job, &arguments.robot, arguments.quick);
     }
     Ok(true)
 }
 
 /// What to do with a finished dataset.
-fn suggest_train(job: &Job, quick: bool) {
+fn suggest_train(job: &Job, robot: &str, quick: bool) {
     let mut train: Vec<String> =
-        ["cargo", "xtask", "train", "--robot", &job.robot, "--data", &typed(&job.out)].map(String::from).to_vec();
+        ["cargo", "xtask", "train", "--robot", robot, "--data", &typed(&job.out)].map(String::from).to_vec();
     train.extend(quick.then(|| "--quick".into()));
     program::next(&[(train, "trains the prior on it")]);
 }

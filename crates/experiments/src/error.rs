@@ -70,6 +70,14 @@ pub enum Error {
         /// Its value here.
         expected: String,
     },
+    /// The folder belongs to a run of another scenario.
+    #[error("{file}: belongs to a run of another scenario, {differences}: choose another --out or remove the folder")]
+    OtherScenario {
+        /// `run.json`.
+        file: PathBuf,
+        /// Keys and their values, there and here.
+        differences: String,
+    },
     /// Files that no run of ours has left there.
     #[error(
         "{file}: exists without {expected} beside it, so no run of this program wrote it: choose another --out or remove it"

@@ -72,7 +72,7 @@ pub(crate) fn check_identity<T: Serialize>(file: &Path, text: &str, expected: &T
             return Err(Error::OtherRun {
                 file: file.to_path_buf(),
                 key: key.clone(),
-                found: other.to_string(),
+                found: if other.is_null() { "missing".into() } else { other.to_string() },
                 expected: value.to_string(),
             });
         }

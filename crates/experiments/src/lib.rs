@@ -10,6 +10,7 @@
 mod archive;
 mod clock;
 mod combined;
+mod differences;
 mod error;
 mod evaluation;
 mod failure;

@@ -147,8 +147,10 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
         program::say!("{warning}");
     }
     let run = evaluation.open(&out)?;
-    if run.resumed() > 0 {
-        program::say!("{} trials are finished already", run.resumed());
+    match run.resumed() {
+        0 => {}
+        1 => program::say!("1 trial is finished already"),
+        n => program::say!("{n} trials are finished already"),
     }
     let interrupted = program::interrupts()?;
     let finished = match arguments.executor {

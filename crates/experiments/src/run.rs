@@ -10,6 +10,7 @@ use agent::{Method, WorldIdentity};
 use cluster::{Array, Engine, Event, Lock, Outcome};
 use serde::{Deserialize, Serialize};
 
+use crate::differences::named_keys;
 use crate::files::{check_identity, claim, file_error, pretty, write_atomically};
 use crate::log::{Log, Trials, cut_broken_line, parse_trials, read_log};
 use crate::shards::{self, Shard};
@@ -72,7 +73,7 @@ impl Run {
     /// A folder of another run, one that another program holds, an unreadable record, a folder that cannot be written. Nothing is
     /// overwritten.
     pub fn open(folder: &Path, provenance: Provenance, scenario_toml: &str) -> Result<Self, Error> {
-        claim(folder, "run.json", &provenance.run, &OURS)?;
+        claim(folder, "run.json", &provenance.run, &OURS).map_err(|error| named_keys(error, folder, scenario_toml))?;
         let lock = Lock::take(&folder.join("run.json"))?;
         // After the identity, so that a kill in between leaves a folder that says whose it is.
         let scenario_file = folder.join("scenario.toml");
@@ -288,6 +289,22 @@ pub(crate) mod tests {
 
     fn finish(run: &Run) -> Table {
         run.finish("D1", "sawyer", "paper", &BTreeMap::new()).unwrap()
+    }
+
+    #[test]
+    fn a_folder_of_another_scenario_is_refused_with_the_keys_that_differ() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(
+            Run::open(folder.path(), provenance(1), "[planner]\ndepth = 20\nbudget = { transitions = 6000 }\n")
+                .unwrap(),
+        );
+        let mut other = provenance(1);
+        other.run.scenario_hash = "other".into();
+        let here = "[planner]\ndepth = 20\nbudget = { simulations = 7 }\n";
+        let message = Run::open(folder.path(), other, here).err().unwrap().to_string();
+        let expected = "belongs to a run of another scenario, `planner.budget.simulations` is missing there and 7 here, \
+                        `planner.budget.transitions` is 6000 there and missing here: choose another --out or remove the folder";
+        assert!(message.ends_with(expected), "{message}");
     }
 
     #[test]

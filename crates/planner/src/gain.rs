@@ -114,7 +114,7 @@ mod tests {
             let step = 1e-3;
             let density =
                 |x: f64| (-0.5 * ((x + lead) / error).powi(2)).exp() / (error * (2.0 * std::f64::consts::PI).sqrt());
-            (0..60_000).map(|i| (i as f64 + 0.5) * step).map(|x| x * density(x) * step).sum::<f64>()
+            (0..60_000).map(|i| (f64::from(i) + 0.5) * step).map(|x| x * density(x) * step).sum::<f64>()
         };
         for (lead, error) in [(0.0, 1.0), (2.0, 1.0), (1.0, 3.0), (-1.5, 2.0)] {
             let (found, expected) = (expected_improvement(lead, error), numeric(lead, error));

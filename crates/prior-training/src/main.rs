@@ -18,7 +18,7 @@ use program::{Failed, typed};
 #[derive(Debug, Parser)]
 #[command(name = "train", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer or jaco.
+    /// Arm: sawyer, jaco, or the robot file that the data were made with.
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Folder of the dataset [default: runs/data/ROBOT, runs/quick/data/ROBOT with --quick].
@@ -71,7 +71,7 @@ Examples:
   cargo xtask train --robot jaco --epochs 20 --data runs/data/jaco --out runs/priors/jaco-20";
 
 /// What went wrong after the input was found to be good.
-const FAILED: Failed = Failed::new("the training stopped, finished epochs are kept");
+const FAILED: Failed = Failed::new("the training stopped, epochs that were finished are kept");
 
 fn main() -> ExitCode {
     program::log_on_request();
@@ -81,20 +81,19 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<bool> {
     let root = prior::project_root(arguments.root.as_deref(), &std::env::current_dir()?)?;
     let runs = root.join(if arguments.quick { "runs/quick" } else { "runs" });
-    let data = arguments.data.clone().unwrap_or_else(|| runs.join("data").join(&arguments.robot));
-    let out = arguments.out.clone().unwrap_or_else(|| runs.join("priors").join(&arguments.robot));
+    let name = prior::robot_name(&arguments.robot);
+    let data = arguments.data.clone().unwrap_or_else(|| runs.join("data").join(name));
+    let out = arguments.out.clone().unwrap_or_else(|| runs.join("priors").join(name));
     rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
 
-    let reader =
-        Reader::open(&data).with_context(|| format!("{}: no usable dataset, make one with datagen", data.display()))?;
+    let robot = &arguments.robot;
+    let reader = Reader::open(&data).with_context(|| {
+        format!("{}: no usable dataset, make one with `cargo xtask datagen --robot {robot}`", data.display())
+    })?;
     let manifest = reader.manifest().clone();
-    if manifest.schema.robot != arguments.robot {
+    if manifest.schema.robot != name {
         let found = &manifest.schema.robot;
-        return Err(anyhow!(
-            "{}: schema.robot is {found}, expected {}",
-            data.join("meta/info.json").display(),
-            arguments.robot
-        ));
+        return Err(anyhow!("{}: schema.robot is {found}, expected {name}", data.join("meta/info.json").display()));
     }
     let recorded = reader.episodes()?;
     let input = if arguments.action_input { ActionInput::OneHot } else { ActionInput::Off };
@@ -135,7 +134,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let checkpoint = trainer.checkpoint(provenance);
     checkpoint.save(&out).context(FAILED)?;
     write_atomically(&out.join("curve.csv"), curve_csv(trainer.curve()).as_bytes()).context(FAILED)?;
-    prior::pictures::learning_curve(&arguments.robot, trainer.curve()).save(&out.join("curve")).context(FAILED)?;
+    prior::pictures::learning_curve(name, trainer.curve()).save(&out.join("curve")).context(FAILED)?;
     program::out!(
         "{}: best epoch {} of {}, held-out {:.3} nats a step on {} episodes",
         out.display(),
@@ -144,14 +143,14 @@ fn run(arguments: &Arguments) -> Result<bool> {
         checkpoint.facts.held_out_nll.unwrap_or(f64::NAN),
         checkpoint.facts.held_out_episodes,
     );
-    suggest_next(&arguments.robot, &root, &out);
+    suggest_next(robot, &root, &out);
     Ok(true)
 }
 
 /// Compares the prior with episodes of other worlds, and plays with it.
 fn suggest_next(robot: &str, root: &Path, out: &Path) {
     let command = |words: &[&str]| ["cargo", "xtask"].iter().chain(words).map(ToString::to_string).collect::<Vec<_>>();
-    let (prior, held_out) = (typed(out), root.join("runs/held-out").join(robot));
+    let (prior, held_out) = (typed(out), root.join("runs/held-out").join(prior::robot_name(robot)));
     let mut next = Vec::new();
     if !held_out.join("meta/info.json").is_file() {
         let data = typed(&held_out);
@@ -159,12 +158,8 @@ fn suggest_next(robot: &str, root: &Path, out: &Path) {
         next.push((command(&words), "makes episodes that it has not seen, for the next command"));
     }
     next.push((command(&["calibrate", "--robot", robot, "--prior", &prior]), "compares it with them"));
-    // An arm of a file is called by the file, whose path is not known here.
-    if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
-        let words =
-            ["eval", "--domain", "D4", "--preset", "paper", "--robot", robot, "--prior", &prior, "--trials", "10"];
-        next.push((command(&words), "plays with it"));
-    }
+    let words = ["eval", "--domain", "D4", "--preset", "paper", "--robot", robot, "--prior", &prior, "--trials", "10"];
+    next.push((command(&words), "plays with it"));
     program::next(&next);
 }
 

@@ -115,6 +115,17 @@ pub fn default_folder(root: &std::path::Path, name: &str, file: &str, quick: boo
     own.find(|folder| folder.join(file).is_file()).unwrap_or(shipped)
 }
 
+/// The name of the arm that a command line names by itself or by its file: folders of data and networks are called by it.
+///
+/// ```
+/// assert_eq!([prior::robot_name("jaco"), prior::robot_name("../my-arm.toml")], ["jaco", "my-arm"]);
+/// ```
+#[must_use]
+pub fn robot_name(robot: &str) -> &str {
+    let stem = std::path::Path::new(robot).file_stem().and_then(|stem| stem.to_str());
+    stem.filter(|_| robot.ends_with(".toml")).unwrap_or(robot)
+}
+
 /// The project folder that a command line names, or the nearest one at or above `start`, else `start`. The programs that train need no
 /// scenario, only a place for their default folders.
 ///

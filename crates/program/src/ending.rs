@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
+use std::io;
 use std::process::ExitCode;
 
 use crate::{complain, say};
@@ -19,10 +20,13 @@ impl Failed {
     }
 }
 
-/// The exit code of an error: 1 where it is marked as [`Failed`], else 2.
+/// The exit code of an error: 1 where it is marked as [`Failed`], else 2. A place that may not be read or written is a bad place, whenever that shows.
 #[must_use]
 pub fn code(error: &anyhow::Error) -> u8 {
-    if error.is::<Failed>() { 1 } else { 2 }
+    let denied = |cause: &(dyn std::error::Error + 'static)| {
+        cause.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::PermissionDenied)
+    };
+    if error.is::<Failed>() && !error.chain().any(denied) { 1 } else { 2 }
 }
 
 /// Ends a program: says why where it went wrong.
@@ -65,6 +69,8 @@ mod tests {
         let with_cause = anyhow!("no space left").context(mark.clone());
         assert_eq!(format!("{with_cause:#}"), "the run stopped: no space left");
         assert_eq!(code(&with_cause.context("trial 3")), 1);
+        let denied = anyhow::Error::new(io::Error::from(io::ErrorKind::PermissionDenied)).context(mark.clone());
+        assert_eq!(code(&denied), 2);
         assert_eq!(code(&mark.into()), 1);
         assert_eq!(code(&anyhow!("the run stopped")), 2);
     }

@@ -70,10 +70,16 @@ impl TruncatedNormal {
     pub fn problem(&self) -> Option<String> {
         let finite = [self.mean, self.stddev, self.low, self.high].iter().all(|v| v.is_finite());
         if !finite || self.stddev < 0.0 || self.low > self.high {
-            return Some(format!("expected finite values, stddev >= 0 and low <= high, found {self:?}"));
+            return Some(format!("expected finite values, stddev >= 0 and low <= high, found {}", self.text()));
         }
         let reachable = self.mean + 6.0 * self.stddev >= self.low && self.mean - 6.0 * self.stddev <= self.high;
-        (!reachable).then(|| format!("expected a mean within 6 stddev of [low, high], found {self:?}"))
+        (!reachable).then(|| format!("expected a mean within 6 stddev of [low, high], found {}", self.text()))
+    }
+
+    /// As scenario files have it.
+    fn text(&self) -> String {
+        let Self { mean, stddev, low, high } = self;
+        format!("{{ mean = {mean}, stddev = {stddev}, low = {low}, high = {high} }}")
     }
 }
 
@@ -104,7 +110,9 @@ impl GammaMean {
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let good = |v: f64| v.is_finite() && v > 0.0;
-        (!(good(self.mean) && good(self.shape))).then(|| format!("expected mean > 0 and shape > 0, found {self:?}"))
+        let Self { mean, shape } = self;
+        let bad = !(good(*mean) && good(*shape));
+        bad.then(|| format!("expected mean > 0 and shape > 0, found {{ mean = {mean}, shape = {shape} }}"))
     }
 }
 

@@ -8,7 +8,7 @@ use toml::{Table, Value};
 use whole_file::{key_of, one_line, plain};
 
 use crate::load::{QUOTED, SENTENCE};
-use crate::suggest::with_nearest;
+use crate::suggest::{with_choices, with_nearest};
 use crate::{Error, Scenario};
 
 /// A file with these keys is a resolved scenario, not a layer.
@@ -75,7 +75,8 @@ impl Layers {
             let message = error.into_inner().message().to_owned();
             let message = message.trim();
             let key = key_of(&path, message);
-            let message = one_line(&plain(&with_nearest(&message.replace('\n', " "))), SENTENCE);
+            let message = plain(&with_nearest(&message.replace('\n', " ")));
+            let message = one_line(&with_choices(message, &key), SENTENCE);
             Error::Key { file: self.origin(&key), key: one_line(&key, QUOTED), message }
         })?;
         match problem(&scenario) {

@@ -1,6 +1,7 @@
 //! What somebody may have meant who wrote a name that does not exist.
 
 use crate::explain::known_keys;
+use crate::format::{resolved, target, variants};
 
 /// Below this likeness of two names a guess would be noise.
 const LIKENESS_MIN: f64 = 0.75;
@@ -16,6 +17,27 @@ pub(crate) fn with_nearest(message: &str) -> String {
     match hint.or_else(|| nearest(name, &known).map(|key| format!("nearest is `{key}`"))) {
         Some(hint) => format!("{unknown}, {hint}, expected {expected}"),
         None => message.into(),
+    }
+}
+
+/// A message that a name or a table with one key was expected, with those that exist at `key`.
+pub(crate) fn with_choices(message: String, key: &str) -> String {
+    const EXPECTED: &str = "expected a name, or a table with one key";
+    let Some((before, after)) = message.split_once(EXPECTED) else { return message };
+    let schema = resolved();
+    let mut node = &schema;
+    for part in key.split('.') {
+        node = target(&schema, node);
+        node = &node["properties"][part];
+    }
+    let names = variants(target(&schema, node)).flat_map(|variant| {
+        let name = variant["const"].as_str().map(|name| format!("\"{name}\""));
+        let keys = variant["properties"].as_object().into_iter().flat_map(|keys| keys.keys());
+        name.into_iter().chain(keys.map(|key| format!("{{ {key} = … }}")))
+    });
+    match names.collect::<Vec<_>>() {
+        names if names.is_empty() => message,
+        names => format!("{before}expected one of {}{after}", names.join(", ")),
     }
 }
 
@@ -51,6 +73,16 @@ mod tests {
     fn a_key_in_the_wrong_table_is_answered_with_the_right_one() {
         let message = "unknown field `horizon`, expected one of `version`, `name`";
         assert!(with_nearest(message).contains("there is `task.horizon`"), "{}", with_nearest(message));
+    }
+
+    #[test]
+    fn a_wrong_choice_is_answered_with_those_that_exist() {
+        let message = || "expected a name, or a table with one key, found 500".to_string();
+        let said = with_choices(message(), "planner.budget");
+        assert!(said.starts_with("expected one of {") && said.contains("{ transitions = … }"), "{said}");
+        assert!(said.ends_with(", found 500"), "{said}");
+        assert!(with_choices(message(), "belief.filter").contains("\"bridge\""));
+        assert_eq!(with_choices(message(), "no.such.key"), message());
     }
 
     #[test]

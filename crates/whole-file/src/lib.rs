@@ -75,7 +75,9 @@ pub fn write(path: &Path, bytes: &[u8], existing: Existing) -> Result<bool, Erro
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder).map_err(Error::at("create a temporary file in", folder))?;
+    // Less the name of the temporary file, which says nothing to anybody.
+    let bare = |e: io::Error| io::Error::from(e.kind());
+    let mut file = builder.tempfile_in(folder).map_err(|e| Error::at("write into the folder", folder)(bare(e)))?;
     let written = file.write_all(bytes).and_then(|()| file.as_file().sync_all());
     written.map_err(Error::at("write", path))?;
     let named = match existing {
@@ -240,7 +242,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("none/a");
         let message = write(&missing, b"1", Existing::Replace).unwrap_err().to_string();
-        assert!(message.starts_with("cannot create a temporary file in ") && message.ends_with("none"), "{message}");
+        assert!(message.starts_with("cannot write into the folder ") && message.ends_with("none"), "{message}");
         // A folder stands where the file should be.
         let taken = folder.path().join("taken");
         std::fs::create_dir(&taken).unwrap();

@@ -21,7 +21,7 @@ struct Arguments {
     /// Domain: tilted, D1 to D5, obstacle, or a scenario file.
     #[arg(long, default_value = "tilted")]
     domain: String,
-    /// Arm: sawyer or jaco.
+    /// Arm: sawyer, jaco, or a robot file.
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Overrides a scenario entry: key=value; effects.truth=[…] is what diagnose has to find.

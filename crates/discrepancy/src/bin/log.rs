@@ -203,8 +203,8 @@ fn print(log: &Log, check: &Check, sentences: &[String]) {
     let rows: usize = log.episodes.iter().map(measured_log::Episode::rows).sum();
     program::out!("{} episodes, {rows} rows.", log.episodes.len());
     program::out!(
-        "{:18} {:>9} {:>10} {:>9} {:>10}  range",
-        "sensor, by column",
+        "{:18} {:>9} {:>10} {:>9} {:>10}  range of all its columns",
+        "by first column",
         "readings",
         "a second",
         "gap, s",

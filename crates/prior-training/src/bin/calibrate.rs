@@ -16,7 +16,7 @@ use program::typed;
 #[derive(Debug, Parser)]
 #[command(name = "calibrate", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer or jaco.
+    /// Arm: sawyer, jaco, or a robot file.
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Folder of the prior [default: the one trained here, runs/priors/ROBOT, else the shipped one].
@@ -60,10 +60,10 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<()> {
     let root = prior::project_root(arguments.root.as_deref(), &std::env::current_dir()?)?;
-    let robot = &arguments.robot;
+    let (robot, name) = (&arguments.robot, prior::robot_name(&arguments.robot));
     let folder =
-        arguments.prior.clone().unwrap_or_else(|| prior::default_folder(&root, robot, prior::checkpoint::FILE, false));
-    let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(robot));
+        arguments.prior.clone().unwrap_or_else(|| prior::default_folder(&root, name, prior::checkpoint::FILE, false));
+    let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(name));
     let out = arguments.out.clone().unwrap_or_else(|| folder.clone());
     check_out(&out)?;
     rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
@@ -108,7 +108,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     let json = serde_json::to_string_pretty(&calibration)? + "\n";
     // The report first: pictures beside it are those of a report.
     write_atomically(&out.join(REPORT), json.as_bytes())?;
-    for (name, figure) in prior::pictures::calibration(robot, &calibration) {
+    for (name, figure) in prior::pictures::calibration(name, &calibration) {
         figure.save(&out.join(name))?;
     }
     if arguments.json {
@@ -116,7 +116,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     } else {
         print(&calibration);
         program::say!("written to {}", typed(&out.join(REPORT)));
-        suggest_next(&root, robot, &folder);
+        suggest_next(robot, &folder);
     }
     Ok(())
 }
@@ -169,14 +169,12 @@ fn memoryless_peer(
     Ok(memoryless.inference()?)
 }
 
-/// Plays with the network, where the arm is one of the project's.
-fn suggest_next(root: &Path, robot: &str, folder: &Path) {
+/// Plays with the network.
+fn suggest_next(robot: &str, folder: &Path) {
     let folder = typed(folder);
     let options = ["--domain", "D4", "--robot", robot, "--prior", &folder, "--trials", "10"];
     let words = ["cargo", "xtask", "eval"].iter().chain(&options).map(ToString::to_string).collect();
-    if root.join("scenarios/robots").join(format!("{robot}.toml")).is_file() {
-        program::next(&[(words, "plays with it")]);
-    }
+    program::next(&[(words, "plays with it")]);
 }
 
 fn print(calibration: &Calibration) {

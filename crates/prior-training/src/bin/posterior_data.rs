@@ -24,7 +24,7 @@ use serde_json::{Value, json};
 #[derive(Debug, Parser)]
 #[command(name = "posterior-data", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer or jaco.
+    /// Arm: sawyer, jaco, or a robot file.
     #[arg(long, default_value = "sawyer")]
     robot: String,
     /// Folder of the dataset.
