@@ -46,6 +46,32 @@ fn episode<'a>(problem: &'a Problem, actions: usize, item: u64) -> (History<'a>,
     (history, network)
 }
 
+#[test]
+fn a_network_counts_obstacles_as_often_as_the_domain_has_them_even_where_the_first_belief_knows_of_none() {
+    let root = find_root(Path::new(env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let selection = Selection {
+        domain: "obstacle".into(),
+        robot: "jaco".into(),
+        preset: "surmise".into(),
+        ..Selection::new(&root)
+    };
+    let problem = Problem::assemble(&selection.load().unwrap(), &root).unwrap();
+    let network = PosteriorNetwork::load(&root.join("assets/priors/jaco-fixed"), "jaco", &problem.model).unwrap();
+    let mut rng = Seed(5).stream(Purpose::Test, 0);
+    let mut world = problem.sample_world(&mut rng).unwrap();
+    let first = problem.truth.initial_observation(&mut world, &mut rng);
+    let mut share = |network: Option<&PosteriorNetwork>| {
+        let history = agent::history(&problem, network, &first);
+        let estimate = Estimate::prior(&history);
+        let drawn: Vec<_> = (0..2000).filter_map(|_| estimate.draw(&mut rng)).collect();
+        drawn.iter().filter(|(classes, _)| classes[1] != NO_OBSTACLE).count() as f64 / drawn.len() as f64
+    };
+    // Three worlds in four of the domain; three in five of the network's training data.
+    let with = share(Some(&network));
+    assert!((with - 0.75).abs() < 0.05, "{with}");
+    assert_eq!(share(None), 0.0);
+}
+
 /// Mean and its standard error.
 fn mean_and_error(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;

@@ -44,12 +44,13 @@ impl<'a> BridgeController<'a> {
     }
 }
 
-/// An episode that began with `first`. What a network has learnt of obstacles is its own prior where the scenario's first belief has none.
+/// An episode that began with `first`. Where the scenario's first belief knows of no obstacle, a network does, from the worlds of its training. It then
+/// counts obstacles as often as the domain has them, as if it had been trained on the domain's own worlds, as the published one was.
 #[must_use]
 pub fn history<'a>(problem: &'a Problem, prior: Option<&PosteriorNetwork>, first: &Observation) -> History<'a> {
     let mut distribution = problem.beliefs.clone();
-    if let (InitialObstacle::None, Some(network)) = (problem.scenario.initial_belief.obstacle, prior) {
-        distribution.obstacle.shape = network.distribution().obstacle.shape;
+    if let (InitialObstacle::None, Some(_)) = (problem.scenario.initial_belief.obstacle, prior) {
+        distribution.obstacle.shape = problem.worlds.obstacle.shape;
     }
     History::new(Coordinates::new(&problem.model, &distribution, &problem.start_joints_rad, first))
 }
