@@ -10,7 +10,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Error {
     /// A file of the log cannot be read.
-    #[error("{}: cannot be read", .path.display())]
+    #[error("{}: cannot be read: {source}", .path.display())]
     Read {
         /// File.
         path: PathBuf,

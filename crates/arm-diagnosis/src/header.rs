@@ -115,9 +115,15 @@ impl Header {
         let bytes = whole_file::read(&path, MOST_BYTES)
             .map_err(|error| Error::Read { path: path.clone(), source: error.source })?;
         let text = std::str::from_utf8(&bytes).map_err(|_| refuse(&path, "expected UTF-8 text"))?;
-        let header: Self = toml::from_str(text).map_err(|error| {
+        let refused = |key: Option<String>, error: &toml::de::Error| {
             let line = whole_file::line_of(text, error.span().map_or(0, |span| span.start));
-            refuse(&path, &format!("line {line}: {}", whole_file::plain(error.message())))
+            let key = key.map_or(String::new(), |key| format!("key `{}`: ", whole_file::key_of(&key, error.message())));
+            refuse(&path, &format!("line {line}: {key}{}", whole_file::plain(error.message())))
+        };
+        let source = toml::Deserializer::parse(text).map_err(|error| refused(None, &error))?;
+        let header: Self = serde_path_to_error::deserialize(source).map_err(|error| {
+            let key = whole_file::one_line(&error.path().to_string(), 200);
+            refused(Some(key), &error.into_inner())
         })?;
         header.check(&path)?;
         Ok(header)

@@ -259,7 +259,12 @@ struct Lists {
 
 /// The arm of a log in scenarios, and the override that gives a simulated world the effects of the model that was found; none outside a project.
 fn simulated_truth(arguments: &Arguments, out: &Path, robot: Robot) -> Option<(&'static str, String)> {
-    let robot = if robot == Robot::Jaco { "jaco" } else { "sawyer" };
+    let robot = match robot {
+        Robot::Sawyer => "sawyer",
+        Robot::Jaco => "jaco",
+        // Whatever pushed there, no task of ours has it.
+        Robot::None => return None,
+    };
     let root = arguments.root.clone().or_else(|| find_root(Path::new(".")).ok())?;
     let base: Base = toml::from_str(&std::fs::read_to_string(root.join("scenarios/base.toml")).ok()?).ok()?;
     let found = ModelFile::read(&out.join("model.toml")).ok()?;

@@ -66,6 +66,20 @@ def without_duration(name, data):
 
 class Answers(unittest.TestCase):
     @unittest.skipUnless(PROGRAM, "SURMISE_DIAGNOSE does not name the program")
+    def test_wrong_arguments_are_named_with_what_was_expected(self):
+        log = surmise.read_log(TILT)
+        cases = [
+            (TypeError, "header: expected a mapping", lambda: surmise.Log.from_pandas({}, 3)),
+            (TypeError, "log: expected a Log", lambda: surmise.diagnose("x")),
+            (ValueError, "threads: expected a whole number", lambda: surmise.diagnose(log, threads=-1)),
+            (ValueError, "seed: expected a whole number", lambda: surmise.diagnose(log, seed=0.5)),
+            (ValueError, "fold: expected .i, k.", lambda: surmise.diagnose(log, fold="3/2")),
+            (ValueError, "fold: expected .i, k.", lambda: surmise.diagnose(log, fold=(3, 2))),
+        ]
+        for kind, words, call in cases:
+            with self.subTest(words), self.assertRaisesRegex(kind, words):
+                call()
+
     def test_results_are_those_of_the_command_but_for_the_duration(self):
         mine, its = FOLDER / "mine", FOLDER / "its"
         DIAGNOSIS.save(mine)

@@ -290,6 +290,7 @@ fn fix(log: &Log, check: &Check, source: &Path, out: &Path) -> Result<(), Error>
 
 /// Writes a changed copy of a log, and says what was done.
 fn copy(mended: &Log, done: &[String], source: &Path, out: &Path) -> Result<(), Error> {
+    whole_file::check_owner(out, "log.toml").map_err(|source| measured_log::Error::Taken { source })?;
     let mut notes = Notes::new();
     notes.insert("", format!("A copy of {}, {}.", source.display(), done.join(", ")));
     measured_log::write(out, mended, Format::Csv, &notes)?;

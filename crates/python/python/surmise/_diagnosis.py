@@ -210,14 +210,14 @@ def diagnose(
 
     Raises :class:`LogError` for a log that cannot be diagnosed, with the sentence of the command.
     """
+    if not isinstance(log, Log):
+        raise TypeError(f"log: expected a Log, as read_log gives it, found {type(log).__name__}")
+    for name, number in (("seed", seed), ("threads", threads)):
+        if not isinstance(number, int) or not 0 <= number < 2**63:
+            raise ValueError(f"{name}: expected a whole number, 0 or more, found {number!r}")
     if model is not None and not isinstance(model, Model):
         model = read_model(model)
-    part = None
-    if fold is not None:
-        index, parts = fold
-        if not 1 <= index <= parts or not 2 <= parts <= 1000:
-            raise ValueError(f"fold: expected (i, k) with 2 to 1000 parts and i from 1 to k, found {fold!r}")
-        part = (index - 1, parts)
+    part = None if fold is None else _part(fold)
     told, end = teller(progress)
     try:
         folder = None if robot is None else os.fspath(robot)
@@ -226,6 +226,14 @@ def diagnose(
     finally:
         end()
     return Diagnosis(native, log, robot)
+
+
+def _part(fold: Any) -> tuple[int, int]:
+    """The part that is held out, from 0, and the number of parts."""
+    whole = isinstance(fold, (tuple, list)) and len(fold) == 2 and all(isinstance(number, int) for number in fold)
+    if not whole or not 1 <= fold[0] <= fold[1] or not 2 <= fold[1] <= 1000:
+        raise ValueError(f"fold: expected (i, k) with 2 to 1000 parts and i from 1 to k, found {fold!r}")
+    return (fold[0] - 1, fold[1])
 
 
 _EFFECT_COLUMNS = ["effect", "confidence", "log_evidence", "parameter", "unit", "value", "low90", "high90"]

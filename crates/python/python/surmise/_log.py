@@ -40,6 +40,8 @@ class Log:
         Raises :class:`LogError` with row and column, or key, and what was expected.
         """
         is_json = not isinstance(header, str)
+        if is_json and not isinstance(header, Mapping):
+            raise TypeError(f"header: expected a mapping or the text of log.toml, found {type(header).__name__}")
         text = json.dumps(header, default=_plain) if is_json else header
         return cls(_surmise.Log.of_columns(columns_of(frame), text, is_json, name))
 
