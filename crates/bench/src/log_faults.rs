@@ -22,6 +22,14 @@ enum Fault {
     DeadSensor,
     /// One force is 1000 N.
     Glitch,
+    /// The largest 3 % of forces are cut off.
+    Clipped,
+    /// One axis of the forces reads 0.
+    DeadAxis,
+    /// The object is 0.2 m away in three rows.
+    Away,
+    /// The tracker's frame is turned by 90° in one episode.
+    OneTurned,
     /// Times of arrival: up to a third of a period late.
     Jitter,
     /// Times 1 % too long.
@@ -62,6 +70,10 @@ fn faults() -> Vec<(&'static str, Fault)> {
         ("added mass in grams", Meant(Reading::AddedMassScaled(1000.0), Kind::AddedMass)),
         ("dead force sensor", Fault::DeadSensor),
         ("one force of 1000 N", Fault::Glitch),
+        ("the largest 3 % of forces cut off", Fault::Clipped),
+        ("dead axis of forces", Fault::DeadAxis),
+        ("object 0.2 m away in three rows", Fault::Away),
+        ("tracker's frame turned in one episode", Fault::OneTurned),
         ("times of arrival", Fault::Jitter),
         ("times 1 % long", Fault::Stretched),
         ("an episode twice", Fault::Repeated),
@@ -192,6 +204,8 @@ const SAME: f64 = 0.3;
 /// What a fault has to change in the cost of poses, and in the cosine of forces, to be seen.
 const SEEN: f64 = 1.0;
 const SEEN_COSINE: f64 = 0.6;
+/// Share of onsets at which a tool touches the object where it tells of one episode.
+const MET: f64 = 0.8;
 
 fn visible(fault: &Fault, good: &Check, spoilt: &Check) -> bool {
     let rises = spoilt.fit.cost() - good.fit.cost() >= SEEN;
@@ -207,9 +221,17 @@ fn visible(fault: &Fault, good: &Check, spoilt: &Check) -> bool {
         Fault::Meant(Reading::TorqueAbout(_), _) => forces.is_some() && has(spoilt, "wrist_tx_nm"),
         Fault::Meant(Reading::AddedMassScaled(_), _) => true,
         Fault::Meant(..) => rises,
-        Fault::DeadSensor | Fault::Glitch | Fault::Jitter | Fault::Stretched | Fault::Repeated | Fault::GravityInG => {
-            true
-        }
+        // The tool has to tell where the object is.
+        Fault::OneTurned => good.fit.touch.is_some_and(|touch| touch.met > MET),
+        Fault::DeadSensor
+        | Fault::Glitch
+        | Fault::Clipped
+        | Fault::DeadAxis
+        | Fault::Away
+        | Fault::Jitter
+        | Fault::Stretched
+        | Fault::Repeated
+        | Fault::GravityInG => true,
     }
 }
 
@@ -264,6 +286,51 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
             episode.channels.insert(force, new);
             Kind::Outliers
         }
+        Fault::Clipped => {
+            has(force).then_some(())?;
+            let axes = measured_log::Axis::ALL.map(Channel::WristForce);
+            let cells = |axis| spoilt.episodes.iter().filter_map(move |episode| episode.channels.get(&axis));
+            let all = axes.into_iter().flat_map(cells).flat_map(Readings::iter).flatten();
+            let limit = statistics::nearest_rank(all.map(f64::abs), 0.97)?;
+            change(&mut spoilt, |channel, _, value| {
+                if matches!(channel, Channel::WristForce(_)) { value.clamp(-limit, limit) } else { value }
+            });
+            Kind::Clipped
+        }
+        Fault::DeadAxis => {
+            has(force).then_some(())?;
+            let axis = Channel::WristForce(measured_log::Axis::Y);
+            change(&mut spoilt, |channel, _, value| if channel == axis { 0.0 } else { value });
+            Kind::DeadSensor
+        }
+        Fault::Away => {
+            let x = Channel::ObjectPosition(measured_log::Axis::X);
+            let middle = spoilt.episodes.len() / 2;
+            let cells = spoilt.episodes[middle].channels.get(&x)?;
+            let read: Vec<usize> = (0..cells.len()).filter(|row| cells.get(*row).is_some()).collect();
+            let away = read.get(read.len() / 3..read.len() / 3 + 3)?.to_vec();
+            let new: Readings = cells
+                .iter()
+                .enumerate()
+                .map(|(row, value)| value.map(|value| if away.contains(&row) { value + 0.2 } else { value }))
+                .collect();
+            spoilt.episodes[middle].channels.insert(x, new);
+            Kind::Outliers
+        }
+        Fault::OneTurned => {
+            let mut turned = Reading::TrackerTurned(1).apply(log);
+            // Near the origin a turn changes little.
+            let far = |a: &measured_log::Episode, b: &measured_log::Episode| {
+                place(a).zip(place(b)).is_some_and(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) > 0.1)
+            };
+            let moved = |index: &usize| {
+                far(&log.episodes[*index], &turned.episodes[*index])
+                    && way_m(&log.episodes[*index]).is_some_and(|way_m| way_m > 0.01)
+            };
+            let index = (log.episodes.len() / 2..log.episodes.len()).find(moved)?;
+            spoilt.episodes[index] = turned.episodes.swap_remove(index);
+            Kind::Geometry
+        }
         Fault::Jitter => {
             let late_secs = 0.33 * log_check::check(log, None).clock?.period_secs;
             for (number, episode) in spoilt.episodes.iter_mut().enumerate() {
@@ -293,6 +360,19 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
     };
     spoilt.checked(Path::new("log.toml"), Path::new("samples.csv")).ok()?;
     Some((spoilt, kind))
+}
+
+/// Where an object is at first, m.
+fn place(episode: &measured_log::Episode) -> Option<[f64; 3]> {
+    (0..episode.rows()).find_map(|row| episode.vector(Channel::ObjectPosition, row))
+}
+
+/// How far an object comes in an episode, along x and y together, m.
+fn way_m(episode: &measured_log::Episode) -> Option<f64> {
+    let mut places = (0..episode.rows()).filter_map(|row| episode.vector(Channel::ObjectPosition, row));
+    let first = places.next()?;
+    let last = places.next_back()?;
+    Some((last[0] - first[0]).hypot(last[1] - first[1]))
 }
 
 fn change(log: &mut Log, new: impl Fn(Channel, usize, f64) -> f64) {

@@ -73,6 +73,9 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
     let motions = Motions::new(log, width_m, |episode, row| arm::tool_m(log, arm, episode, row));
     let fit = geometry::fit(None, log, &tool, &motions);
     let (geometry, mut not_told) = of_geometry(log, &tool, &motions, &fit);
+    if geometry.is_none() {
+        suspicions.extend(geometry::astray(log, &tool, &motions).map(of_astray));
+    }
     let meant = geometry.as_ref().and_then(|suspicion| suspicion.readings.first().copied());
     suspicions.extend(sensors::suspicions(log, &sensors, clock.as_ref(), &|index, secs| motions.sets_out(index, secs)));
     suspicions.extend(geometry);
@@ -210,6 +213,22 @@ fn broken(rest: Option<geometry::Rest>, touch: Option<geometry::Touch>) -> Strin
 /// A log whose tool is not where the object sets out, and that no reading mends.
 fn lost(own: &Fit) -> Option<Suspicion> {
     own.touch.filter(|touch| touch.met < LEAST_MET).map(|_| unexplained(own))
+}
+
+fn of_astray(astray: geometry::Astray) -> Suspicion {
+    let geometry::Astray { id, secs, distance_m, count, of } = astray;
+    let others = match count {
+        1 => String::new(),
+        many => format!(" So it is in {} others.", many - 1),
+    };
+    let found = format!(
+        "In episode {id} the tool is {:.0} mm from the object where that sets out, and it touches it in nearly all of the {of} episodes.{others}",
+        1e3 * distance_m
+    );
+    let mend = "Does it have another frame, clock or object than the others? Else take it out.";
+    let mut suspicion = Suspicion::new(Kind::Geometry, found, mend);
+    suspicion.shown_at = Some((id, secs));
+    suspicion
 }
 
 fn unexplained(own: &Fit) -> Suspicion {

@@ -4,7 +4,7 @@ use measured_log::{Log, Shape};
 use nalgebra::{Isometry3, Vector3};
 use serde::Serialize;
 
-use crate::motion::{Motions, Seen};
+use crate::motion::{Motion, Motions, Seen};
 use crate::reading::Reading;
 use crate::shape::Solid;
 
@@ -17,6 +17,10 @@ const TOLERANCE_SHARE: f64 = 0.15;
 const TILT_RAD: f64 = 0.1;
 /// Onsets that suffice to judge by.
 const LEAST_ONSETS: usize = 5;
+
+/// Tolerances that the tool of an episode is away from the object if it has another frame than the others; the share of all that have to meet.
+const ASTRAY: f64 = 5.0;
+const MOST_MET: f64 = 0.7;
 
 /// A tool: balls about its centre, m, base axes.
 #[derive(Clone, Debug, Default)]
@@ -111,6 +115,65 @@ pub(crate) fn fit(reading: Option<&Reading>, log: &Log, tool: &Tool, motions: &M
     }
 }
 
+/// An episode whose tool is elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Astray {
+    pub(crate) id: u64,
+    /// Where its object first sets out, s.
+    pub(crate) secs: f64,
+    /// How far the tool is from the object there, m.
+    pub(crate) distance_m: f64,
+    /// Such episodes, and all in which the object sets out.
+    pub(crate) count: usize,
+    pub(crate) of: usize,
+}
+
+/// Episodes in which the tool is far from the object wherever it sets out, where it touches it in nearly all others.
+pub(crate) fn astray(log: &Log, tool: &Tool, motions: &Motions) -> Option<Astray> {
+    let smallest = Solid::new(&log.header.object.shape).half_m().into_iter().fold(f64::INFINITY, f64::min);
+    let tolerance_m = (TOLERANCE_M + 2.0 * motions.position_m).max(TOLERANCE_SHARE * smallest);
+    // Where it sets out; where it was never seen to rest before, wherever it is as it comes along.
+    let distances = |reading: Option<&Reading>, episode: &Motion| -> Vec<f64> {
+        let (solid, tool) = sized(reading, &log.header.object.shape, tool);
+        let nearest = |onset: &usize| nearest_m(reading, &solid, &tool, &episode.seen, *onset);
+        if !episode.onsets.is_empty() {
+            return episode.onsets.iter().filter_map(nearest).map(f64::abs).collect();
+        }
+        let place = |seen: &Seen| seen.pose.translation.vector;
+        let moved = episode.seen.first().zip(episode.seen.last());
+        if moved.is_none_or(|(first, last)| (place(last) - place(first)).norm() < smallest) {
+            return Vec::new();
+        }
+        let all =
+            episode.seen.iter().filter_map(|seen| Some(distance_m(reading, &solid, &tool, seen, seen.tool?).abs()));
+        all.min_by(f64::total_cmp).into_iter().collect()
+    };
+    let least = |distances: &[f64]| distances.iter().copied().min_by(f64::total_cmp);
+    let all: Vec<(&Motion, f64)> =
+        motions.episodes.iter().filter_map(|episode| Some((episode, least(&distances(None, episode))?))).collect();
+    let met = all.iter().filter(|(_, distance_m)| *distance_m <= tolerance_m).count();
+    // An object that sets out by itself once has the frame of the others: another reading tells, or a second time.
+    let told = |episode: &Motion| {
+        let fits = |reading: &Reading| distances(Some(reading), episode).iter().all(|off_m| *off_m <= tolerance_m);
+        episode.onsets.len() > 1 || readings(&log.header.object.shape, motions.turns).iter().any(fits)
+    };
+    let far: Vec<&(&Motion, f64)> =
+        all.iter().filter(|(episode, distance_m)| *distance_m > ASTRAY * tolerance_m && told(episode)).collect();
+    let &&(episode, distance_m) = far.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (id, secs) = (episode.id, episode.seen[episode.onsets.first().copied().unwrap_or(0)].secs);
+    let known = met >= LEAST_ONSETS && met as f64 >= MOST_MET * all.len() as f64;
+    known.then_some(Astray { id, secs, distance_m, count: far.len(), of: all.len() })
+}
+
+/// Signed distance of the tool from the object as it sets out, m: of the moments nearby that which comes nearest to a touch, as the clocks are not known better.
+fn nearest_m(reading: Option<&Reading>, solid: &Solid, tool: &Tool, seen: &[Seen], onset: usize) -> Option<f64> {
+    let begun = &seen[onset];
+    let near = |seen: &&Seen| (seen.secs - begun.secs).abs() <= CLOCKS_SECS;
+    // The object has moved by no more than makes an onset.
+    let around = seen.iter().filter(near).filter_map(|seen| Some(distance_m(reading, solid, tool, begun, seen.tool?)));
+    around.min_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
 fn cost(off: f64) -> f64 {
     off.powi(2).ln_1p()
 }
@@ -128,16 +191,7 @@ fn touch(reading: Option<&Reading>, solid: &Solid, tool: &Tool, motions: &Motion
     let (mut met, mut distances, mut costs, mut deep) = (0_u32, Vec::new(), Vec::new(), Vec::new());
     for episode in &motions.episodes {
         for onset in &episode.onsets {
-            let begun = &episode.seen[*onset];
-            let near = |seen: &&Seen| (seen.secs - begun.secs).abs() <= CLOCKS_SECS;
-            // The object has moved by no more than makes an onset.
-            let around = episode
-                .seen
-                .iter()
-                .filter(near)
-                .filter_map(|seen| Some(distance_m(reading, solid, tool, begun, seen.tool?)));
-            // That which comes nearest to a touch: the clocks are not known better.
-            let Some(off) = around.min_by(|a, b| a.abs().total_cmp(&b.abs())) else { continue };
+            let Some(off) = nearest_m(reading, solid, tool, &episode.seen, *onset) else { continue };
             met += u32::from(off.abs() <= tolerance_m);
             distances.push(off);
             costs.push(cost(off / tolerance_m));

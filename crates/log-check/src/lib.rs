@@ -22,6 +22,7 @@
 mod align;
 mod arm;
 mod check;
+mod clipped;
 mod geometry;
 mod motion;
 mod reading;

@@ -3,12 +3,16 @@
 use measured_log::{Axis, Channel, Component, Episode, Log};
 use serde::Serialize;
 
+use crate::clipped::{clipped, dead_axes};
 use crate::suspicion::{Kind, Suspicion};
 
 /// Rows after which a sensor that never changes is dead, if others do.
 const DEAD_ROWS: usize = 50;
 /// A spike is this many times larger than what its neighbours, and nine in ten of all readings, differ from each other by.
 const SPIKE: f64 = 8.0;
+/// Rows, and seconds, in which a reading can be away and come back; what moves takes longer.
+const MOST_AWAY: usize = 5;
+const AWAY_SECS: f64 = 0.1;
 /// A force is beyond what contacts do if it is so many times larger than all others but a few.
 const BEYOND: f64 = 10.0;
 const FEW: usize = 10;
@@ -180,6 +184,8 @@ pub(crate) fn suspicions(
             },
         )
     }).collect();
+    all.extend(dead_axes(log));
+    all.extend(clipped(log));
     all.extend(clock.and_then(|clock| of_clock(log, clock)));
     all.extend(groups(log).iter().filter_map(|group| spikes(log, group, blow)));
     all.extend(repeated(log));
@@ -291,7 +297,7 @@ pub fn without_dead(log: &Log) -> Option<Log> {
     })
 }
 
-/// Single readings that stand out from those before and after by far more than these from each other.
+/// Single readings, and of places up to [`MOST_AWAY`] in a row, that stand out from those before and after by far more than these from each other.
 ///
 /// Of places, which cannot go there and back; of forces only far beyond all others, and not where the object sets out: blows are as short. `blow`: whether it does,
 /// in an episode, by its index, at a time.
@@ -312,20 +318,30 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64) -> bool) -> Op
     };
     let all = log.episodes.iter().flat_map(|episode| group.iter().flat_map(move |channel| steps(episode, *channel)));
     let usual = statistics::nearest_rank(all, 0.9)?;
-    let mut far: Vec<(f64, u64, f64, Channel, f64)> = Vec::new();
+    let mut far: Vec<(f64, u64, f64, Channel, f64, usize)> = Vec::new();
     for (index, episode) in log.episodes.iter().enumerate() {
         for channel in group {
             let read: Vec<(usize, f64)> = readings(episode, *channel).collect();
-            for seven in read.windows(7) {
-                let value = |i: usize| seven[i].1;
-                let alone = (value(3) - 0.5 * (value(2) + value(4))).abs() - 0.5 * (value(4) - value(2)).abs();
+            for (burst, rows) in
+                (1..=if forces { 1 } else { MOST_AWAY }).flat_map(|n| read.windows(n + 6).map(move |rows| (n, rows)))
+            {
+                let value = |i: usize| rows[i].1;
+                let secs = episode.time_secs[rows[3].0];
+                if burst > 1 && episode.time_secs[rows[2 + burst].0] - secs > AWAY_SECS {
+                    continue;
+                }
+                let (before, after) = (value(2), value(3 + burst));
+                // All of them, of the way from one side to the other.
+                let away =
+                    (3..3 + burst).map(|i| (value(i) - 0.5 * (before + after)).abs()).fold(f64::INFINITY, f64::min);
+                let alone = away - 0.5 * (after - before).abs();
                 // A bounce has a corner too, but neighbours that go as far.
-                let near = [(0, 1), (1, 2), (4, 5), (5, 6)].map(|(a, b)| (value(b) - value(a)).abs());
+                let near =
+                    [(0, 1), (1, 2), (3, 4), (4, 5)].map(|(a, b)| if a < 2 { (a, b) } else { (a + burst, b + burst) });
+                let near = near.map(|(a, b)| (value(b) - value(a)).abs());
                 let limit = SPIKE * near.into_iter().fold(usual, f64::max);
-                let row = seven[3].0;
-                let secs = episode.time_secs[row];
                 if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs))) {
-                    far.push((alone / usual, episode.id, secs, *channel, value(3)));
+                    far.push((alone / usual, episode.id, secs, *channel, value(3), burst));
                 }
             }
         }
@@ -335,7 +351,8 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64) -> bool) -> Op
         1 => String::new(),
         many => format!(" So do {} other readings.", many - 1),
     };
-    let found = format!("{} reads {:.4} in one row, and not before or after.{count}", worst.3.name(), worst.4);
+    let rows = if worst.5 == 1 { "one row".into() } else { format!("{} rows", worst.5) };
+    let found = format!("{} reads {:.4} in {rows}, and not before or after.{count}", worst.3.name(), worst.4);
     let mut suspicion = Suspicion::new(Kind::Outliers, found, "Leave such cells empty.");
     suspicion.shown_at = Some((worst.1, worst.2));
     Some(suspicion)

@@ -22,6 +22,8 @@ pub enum Kind {
     Joints,
     /// A sensor that reads the same in every row.
     DeadSensor,
+    /// A sensor that stays at its limit.
+    Clipped,
     /// Single readings far from those before and after.
     Outliers,
     /// Rows come at another rate than the header says.
