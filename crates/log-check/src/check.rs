@@ -216,7 +216,7 @@ fn lost(own: &Fit) -> Option<Suspicion> {
 }
 
 fn of_astray(astray: geometry::Astray) -> Suspicion {
-    let geometry::Astray { id, secs, distance_m, count, of } = astray;
+    let geometry::Astray { id, secs, distance_m, reading, count, of } = astray;
     let others = match count {
         1 => String::new(),
         many => format!(" So it is in {} others.", many - 1),
@@ -225,8 +225,8 @@ fn of_astray(astray: geometry::Astray) -> Suspicion {
         "In episode {id} the tool is {:.0} mm from the object where that sets out, and it touches it in nearly all of the {of} episodes.{others}",
         1e3 * distance_m
     );
-    let mend = "Does it have another frame, clock or object than the others? Else take it out.";
-    let mut suspicion = Suspicion::new(Kind::Geometry, found, mend);
+    let mend = format!("It fits {}: was it recorded otherwise than the others? Else take it out.", reading.words());
+    let mut suspicion = Suspicion::new(Kind::Geometry, found, &mend);
     suspicion.shown_at = Some((id, secs));
     suspicion
 }

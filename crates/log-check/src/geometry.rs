@@ -21,6 +21,17 @@ const LEAST_ONSETS: usize = 5;
 /// Tolerances that the tool of an episode is away from the object if it has another frame than the others; the share of all that have to meet.
 const ASTRAY: f64 = 5.0;
 const MOST_MET: f64 = 0.7;
+/// Other frames that an episode may have. Sizes and units that fit one episode alone do so by chance.
+const FRAMES: [Reading; 8] = [
+    Reading::TrackerTurned(1),
+    Reading::TrackerTurned(2),
+    Reading::TrackerTurned(3),
+    Reading::Mirrored(0),
+    Reading::Mirrored(1),
+    Reading::PositionMirrored(0),
+    Reading::PositionMirrored(1),
+    Reading::PositionSwapped,
+];
 
 /// A tool: balls about its centre, m, base axes.
 #[derive(Clone, Debug, Default)]
@@ -123,12 +134,14 @@ pub(crate) struct Astray {
     pub(crate) secs: f64,
     /// How far the tool is from the object there, m.
     pub(crate) distance_m: f64,
+    /// Under which it touches it.
+    pub(crate) reading: Reading,
     /// Such episodes, and all in which the object sets out.
     pub(crate) count: usize,
     pub(crate) of: usize,
 }
 
-/// Episodes in which the tool is far from the object wherever it sets out, where it touches it in nearly all others.
+/// Episodes in which the tool is far from the object wherever it sets out, and touches it under a usual mistake, where it touches it in nearly all others.
 pub(crate) fn astray(log: &Log, tool: &Tool, motions: &Motions) -> Option<Astray> {
     let smallest = Solid::new(&log.header.object.shape).half_m().into_iter().fold(f64::INFINITY, f64::min);
     let tolerance_m = (TOLERANCE_M + 2.0 * motions.position_m).max(TOLERANCE_SHARE * smallest);
@@ -152,17 +165,20 @@ pub(crate) fn astray(log: &Log, tool: &Tool, motions: &Motions) -> Option<Astray
     let all: Vec<(&Motion, f64)> =
         motions.episodes.iter().filter_map(|episode| Some((episode, least(&distances(None, episode))?))).collect();
     let met = all.iter().filter(|(_, distance_m)| *distance_m <= tolerance_m).count();
-    // An object that sets out by itself once has the frame of the others: another reading tells, or a second time.
+    // An object that something else moves has the frame of the others: only another reading tells.
     let told = |episode: &Motion| {
         let fits = |reading: &Reading| distances(Some(reading), episode).iter().all(|off_m| *off_m <= tolerance_m);
-        episode.onsets.len() > 1 || readings(&log.header.object.shape, motions.turns).iter().any(fits)
+        FRAMES.into_iter().find(fits)
     };
-    let far: Vec<&(&Motion, f64)> =
-        all.iter().filter(|(episode, distance_m)| *distance_m > ASTRAY * tolerance_m && told(episode)).collect();
-    let &&(episode, distance_m) = far.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let far: Vec<(&Motion, f64, Reading)> = all
+        .iter()
+        .filter(|(_, distance_m)| *distance_m > ASTRAY * tolerance_m)
+        .filter_map(|&(episode, distance_m)| Some((episode, distance_m, told(episode)?)))
+        .collect();
+    let &(episode, distance_m, reading) = far.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let (id, secs) = (episode.id, episode.seen[episode.onsets.first().copied().unwrap_or(0)].secs);
     let known = met >= LEAST_ONSETS && met as f64 >= MOST_MET * all.len() as f64;
-    known.then_some(Astray { id, secs, distance_m, count: far.len(), of: all.len() })
+    known.then_some(Astray { id, secs, distance_m, reading, count: far.len(), of: all.len() })
 }
 
 /// Signed distance of the tool from the object as it sets out, m: of the moments nearby that which comes nearest to a touch, as the clocks are not known better.
