@@ -326,6 +326,7 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
             let moved = |index: &usize| {
                 far(&log.episodes[*index], &turned.episodes[*index])
                     && way_m(&log.episodes[*index]).is_some_and(|way_m| way_m > 0.01)
+                    && rests_first(&log.episodes[*index])
             };
             let index = (log.episodes.len() / 2..log.episodes.len()).find(moved)?;
             spoilt.episodes[index] = turned.episodes.swap_remove(index);
@@ -360,6 +361,15 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
     };
     spoilt.checked(Path::new("log.toml"), Path::new("samples.csv")).ok()?;
     Some((spoilt, kind))
+}
+
+/// Whether an object stays where it is at first for 0.3 s, to 2 mm.
+fn rests_first(episode: &measured_log::Episode) -> bool {
+    let Some(first) = place(episode) else { return false };
+    let begun = episode.time_secs[0];
+    let rows = (0..episode.rows()).take_while(|row| episode.time_secs[*row] - begun < 0.3);
+    let mut places = rows.filter_map(|row| episode.vector(Channel::ObjectPosition, row));
+    places.all(|place| (place[0] - first[0]).hypot(place[1] - first[1]) < 0.002)
 }
 
 /// Where an object is at first, m.

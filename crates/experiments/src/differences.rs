@@ -7,6 +7,8 @@ use crate::Error;
 
 /// Keys that a message names.
 const MOST: usize = 3;
+/// Length of a value in it.
+const MOST_CHARS: usize = 300;
 
 /// Names the keys in which the scenario of another run differs, where all that is known is that it does.
 pub(crate) fn named_keys(error: Error, folder: &Path, scenario_toml: &str) -> Error {
@@ -20,7 +22,9 @@ pub(crate) fn named_keys(error: Error, folder: &Path, scenario_toml: &str) -> Er
         values
     });
     let keys: BTreeSet<&String> = there.keys().chain(here.keys()).collect();
-    let told = |values: &BTreeMap<String, String>, key| values.get(key).map_or("missing".into(), Clone::clone);
+    let told = |values: &BTreeMap<String, String>, key| {
+        values.get(key).map_or("missing".into(), |value| whole_file::one_line(value, MOST_CHARS))
+    };
     let mut differences: Vec<String> = keys
         .into_iter()
         .filter(|key| there.get(*key) != here.get(*key))
@@ -46,7 +50,7 @@ fn flatten(path: &str, value: &toml::Value, values: &mut BTreeMap<String, String
             }
         }
         None => {
-            values.insert(path.into(), whole_file::one_line(&value.to_string(), 60));
+            values.insert(path.into(), value.to_string());
         }
     }
 }

@@ -12,13 +12,14 @@ const EQUAL: f64 = 0.1;
 /// Share of different readings among those that are not at the limit from which repeats are no chance, and how many repeats then suffice.
 const DISTINCT: f64 = 0.5;
 const FINE_ROWS: usize = 5;
+/// Resolution, as a share of an axis's range, with which an axis that is hardly loaded changes too.
+const FINE: f64 = 0.005;
 /// Readings after which an axis that never changes is dead, if the others change.
 const DEAD_ROWS: usize = 50;
 
-/// Forces, torques and velocities whose sensors have a limit.
+/// Forces and torques, whose sensors have a limit.
 fn limited(log: &Log) -> Vec<Channel> {
-    let vectors: [fn(Axis) -> Channel; 4] =
-        [Channel::WristForce, Channel::WristTorque, Channel::ObjectVelocity, Channel::ObjectSpin];
+    let vectors: [fn(Axis) -> Channel; 2] = [Channel::WristForce, Channel::WristTorque];
     let joints = (0..log.header.robot.joints()).map(Channel::JointTorque);
     let all = vectors.into_iter().flat_map(|make| Axis::ALL.map(make)).chain(joints);
     all.filter(|channel| log.has(*channel)).collect()
@@ -68,6 +69,11 @@ pub(crate) fn clipped(log: &Log) -> Option<Suspicion> {
 /// Rows at the limit and where the first is, if they are many. Readings that hardly ever repeat do not repeat their largest by chance. Those of a coarse
 /// sensor do: there they have to stay in runs, and to change from row to row elsewhere.
 fn at_limit(read: &[Vec<(usize, f64)>], limit: f64) -> Option<(usize, (usize, usize))> {
+    // Most episodes begin with what a sensor reads at rest, whatever its zero is.
+    let begins = read.iter().filter(|values| values.first().is_some_and(|(_, value)| *value == limit)).count();
+    if 2 * begins > read.len() {
+        return None;
+    }
     let (mut rows, mut in_runs, mut longest, mut first) = (0, 0, 0, None);
     let (mut equal, mut elsewhere, mut others) = (0, 0, Vec::new());
     for (episode, values) in read.iter().enumerate() {
@@ -92,37 +98,41 @@ fn at_limit(read: &[Vec<(usize, f64)>], limit: f64) -> Option<(usize, (usize, us
     (count > 0.0 && (fine || coarse)).then_some((rows, first?))
 }
 
-/// Axes of forces and torques that read the same in all rows, where another axis of the sensor changes.
+/// Axes of forces and torques that read the same in all rows, where other axes of the sensor change, and by less than it can tell apart.
 pub(crate) fn dead_axes(log: &Log) -> Option<Suspicion> {
-    let constant = |channel: Channel| {
-        let read = readings(log, channel);
-        let mut values = read.iter().flatten().map(|(_, value)| *value);
-        let first = values.next()?;
-        values.all(|value| value == first).then_some(first)
-    };
     let sensors: [fn(Axis) -> Channel; 2] = [Channel::WristForce, Channel::WristTorque];
-    for make in sensors {
-        let axes = Axis::ALL.map(make);
-        let count: usize = readings(log, axes[0]).iter().map(Vec::len).sum();
-        if !log.has(axes[0]) || count < DEAD_ROWS {
+    let found = sensors.into_iter().flat_map(|make| dead_of(log, &Axis::ALL.map(make)));
+    let names: Vec<String> = found.map(|(channel, value)| format!("{} (always {value})", channel.name())).collect();
+    (!names.is_empty()).then(|| {
+        let found = format!(
+            "{} never changes, while another axis of the sensor does: it is dead or was not measured.",
+            names.join(", ")
+        );
+        Suspicion::new(Kind::DeadSensor, found, "A constant is taken for a measurement. Leave such a column out.")
+    })
+}
+
+/// The dead ones of the axes of a sensor, with what they read.
+fn dead_of(log: &Log, axes: &[Channel]) -> Vec<(Channel, f64)> {
+    let read: Vec<(Channel, Vec<Vec<(usize, f64)>>)> =
+        axes.iter().filter(|axis| log.has(**axis)).map(|axis| (*axis, readings(log, *axis))).collect();
+    let values = |read: &Vec<Vec<(usize, f64)>>| read.iter().flatten().map(|(_, value)| *value).collect::<Vec<f64>>();
+    let (mut dead, mut fine) = (Vec::new(), false);
+    for (channel, read) in &read {
+        let all = values(read);
+        if all.len() < DEAD_ROWS {
             continue;
         }
-        let values = axes.map(constant);
-        // All three are a dead sensor.
-        if values.iter().all(Option::is_some) {
+        let [low, high] =
+            [all.iter().copied().fold(f64::INFINITY, f64::min), all.iter().copied().fold(f64::NEG_INFINITY, f64::max)];
+        if low == high {
+            dead.push((*channel, low));
             continue;
         }
-        if let Some((axis, value)) = axes.into_iter().zip(values).find_map(|(axis, value)| Some((axis, value?))) {
-            let found = format!(
-                "{} reads exactly {value} in all rows, and the other axes change: it is dead or was not measured.",
-                axis.name()
-            );
-            return Some(Suspicion::new(
-                Kind::DeadSensor,
-                found,
-                "A constant is taken for a measurement. Take the sensor's columns out where an axis is dead.",
-            ));
-        }
+        let steps = read.iter().flat_map(|episode| episode.windows(2)).map(|pair| (pair[1].1 - pair[0].1).abs());
+        let step = steps.filter(|step| *step > 0.0).fold(f64::INFINITY, f64::min);
+        fine |= step <= FINE * (high - low);
     }
-    None
+    // All of them are a dead sensor. An axis of a coarse one may read zero although it is not.
+    if fine { dead } else { Vec::new() }
 }

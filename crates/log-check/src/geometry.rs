@@ -145,21 +145,10 @@ pub(crate) struct Astray {
 pub(crate) fn astray(log: &Log, tool: &Tool, motions: &Motions) -> Option<Astray> {
     let smallest = Solid::new(&log.header.object.shape).half_m().into_iter().fold(f64::INFINITY, f64::min);
     let tolerance_m = (TOLERANCE_M + 2.0 * motions.position_m).max(TOLERANCE_SHARE * smallest);
-    // Where it sets out; where it was never seen to rest before, wherever it is as it comes along.
     let distances = |reading: Option<&Reading>, episode: &Motion| -> Vec<f64> {
         let (solid, tool) = sized(reading, &log.header.object.shape, tool);
         let nearest = |onset: &usize| nearest_m(reading, &solid, &tool, &episode.seen, *onset);
-        if !episode.onsets.is_empty() {
-            return episode.onsets.iter().filter_map(nearest).map(f64::abs).collect();
-        }
-        let place = |seen: &Seen| seen.pose.translation.vector;
-        let moved = episode.seen.first().zip(episode.seen.last());
-        if moved.is_none_or(|(first, last)| (place(last) - place(first)).norm() < smallest) {
-            return Vec::new();
-        }
-        let all =
-            episode.seen.iter().filter_map(|seen| Some(distance_m(reading, &solid, &tool, seen, seen.tool?).abs()));
-        all.min_by(f64::total_cmp).into_iter().collect()
+        episode.onsets.iter().filter_map(nearest).map(f64::abs).collect()
     };
     let least = |distances: &[f64]| distances.iter().copied().min_by(f64::total_cmp);
     let all: Vec<(&Motion, f64)> =
@@ -167,7 +156,12 @@ pub(crate) fn astray(log: &Log, tool: &Tool, motions: &Motions) -> Option<Astray
     let met = all.iter().filter(|(_, distance_m)| *distance_m <= tolerance_m).count();
     // An object that something else moves has the frame of the others: only another reading tells.
     let told = |episode: &Motion| {
-        let fits = |reading: &Reading| distances(Some(reading), episode).iter().all(|off_m| *off_m <= tolerance_m);
+        // A touch once, and never far: where it sets out again, the moment is less sure.
+        let fits = |reading: &Reading| {
+            let distances = distances(Some(reading), episode);
+            least(&distances).is_some_and(|distance_m| distance_m <= tolerance_m)
+                && distances.iter().all(|distance_m| *distance_m <= 0.5 * ASTRAY * tolerance_m)
+        };
         FRAMES.into_iter().find(fits)
     };
     let far: Vec<(&Motion, f64, Reading)> = all
@@ -176,7 +170,7 @@ pub(crate) fn astray(log: &Log, tool: &Tool, motions: &Motions) -> Option<Astray
         .filter_map(|&(episode, distance_m)| Some((episode, distance_m, told(episode)?)))
         .collect();
     let &(episode, distance_m, reading) = far.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let (id, secs) = (episode.id, episode.seen[episode.onsets.first().copied().unwrap_or(0)].secs);
+    let (id, secs) = (episode.id, episode.seen[episode.onsets[0]].secs);
     let known = met >= LEAST_ONSETS && met as f64 >= MOST_MET * all.len() as f64;
     known.then_some(Astray { id, secs, distance_m, reading, count: far.len(), of: all.len() })
 }

@@ -109,9 +109,10 @@ pub enum Budget {
 /// The budget is spent in `rounds` equal parts. After each, the search ends if exact values of all actions could be expected to add at most `gain` to
 /// the decision. This is the largest expected improvement E[max(0, V(a) − V(best))] of another legal action, for a difference that is normal about that
 /// of the mean returns. The standard error of a mean is the standard deviation of an action's returns at the root in this search over √N(ha);
-/// actions with few returns borrow from the spread of all. So a search ends where one action is clearly the best, and also where several are
+/// actions with few returns borrow from the spread of all. N(ha) counts what was kept from earlier searches and initial visits, as the mean does. So a search ends where one action is clearly the best, and also where several are
 /// equally good. Such a value of information as a rule to stop is that of Hay, Russell, Tolpin and Shimony, "Selecting computations: theory and
-/// applications" (UAI 2012). Returns of one tree are not independent, as the tree learns: the figure is an estimate, not a bound.
+/// applications" (UAI 2012). Returns of one tree are not independent, as the tree learns: the figure is an estimate, not a bound. While all
+/// returns are equal nothing is known, and the search goes on. With a budget of time each round may end one simulation late.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]

@@ -48,6 +48,10 @@ pub(crate) fn open_gain(stats: &[ActionStats], returns: &[Moments], legal: &[boo
         return f64::INFINITY;
     }
     let pooled = returns.iter().map(|r| r.squares).sum::<f64>() / freedom;
+    if pooled == 0.0 {
+        // Returns that have all been equal so far are no proof that others are: a goal may not have been found yet.
+        return f64::INFINITY;
+    }
     // Of a mean, squared.
     let error = |action: usize| {
         let own = returns[action];
@@ -59,7 +63,7 @@ pub(crate) fn open_gain(stats: &[ActionStats], returns: &[Moments], legal: &[boo
         0 => f64::INFINITY,
         _ => expected_improvement(stats[best].value - stats[action].value, (error(best) + error(action)).sqrt()),
     });
-    gains.fold(0.0, f64::max)
+    gains.fold(0.0, |most: f64, gain| if gain.is_nan() { f64::INFINITY } else { most.max(gain) })
 }
 
 /// E[max(0, X)] of a normal X with mean −`lead` and the standard deviation `error`.
@@ -147,5 +151,7 @@ mod tests {
         assert!(open_gain(&stats(&returns), &returns, &[true; 2], 0) > 1.0);
         let unknown = open_gain(&stats(&returns[..1]), &[Moments::default()], &[true], 0);
         assert_eq!(unknown, f64::INFINITY, "nothing was simulated");
+        let same = [of(&[-2.85; 8]), of(&[-2.85; 8])];
+        assert_eq!(open_gain(&stats(&same), &same, &[true; 2], 0), f64::INFINITY, "no return has differed so far");
     }
 }

@@ -146,9 +146,12 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
         let mut enough = false;
         for round in 0..rounds {
             parallel::for_each(&mut started, config.threads, rng, |index, ((tree, root), progress), rng| {
-                let fresh = std::mem::replace(root, Root::Known) == Root::Fresh;
                 let share = Share::of(config, index, round, rounds);
-                Search::new(model, policy, config, tree, depth, progress).run(belief, fresh, share, rng);
+                Search::new(model, policy, config, tree, depth, progress).run(belief, *root == Root::Fresh, share, rng);
+                // A round may be too short for a simulation.
+                if progress.tally.simulations > 0 {
+                    *root = Root::Known;
+                }
             });
             enough = round + 1 < rounds && enough_is_known(config, &started);
             if enough {

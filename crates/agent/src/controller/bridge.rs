@@ -45,7 +45,7 @@ impl<'a> BridgeController<'a> {
 }
 
 /// An episode that began with `first`. Where the scenario's first belief knows of no obstacle, a network does, from the worlds of its training. It then
-/// counts obstacles as often as the domain has them, as if it had been trained on the domain's own worlds, as the published one was.
+/// counts obstacles as often as the domain has them, as on the other domains. The paper does not say how often its training data had them.
 #[must_use]
 pub fn history<'a>(problem: &'a Problem, prior: Option<&PosteriorNetwork>, first: &Observation) -> History<'a> {
     let mut distribution = problem.beliefs.clone();

@@ -38,6 +38,11 @@ fn priors_count_as_visits_and_illegal_actions_are_never_taken() {
     let taken = full.actions[2].visits - 1000;
     assert!((full.actions[2].value - (7000.0 + taken as f64) / (1000.0 + taken as f64)).abs() < 1e-9);
     assert_eq!((full.action, search(ActionPriors::Full, 1).actions[1].visits), (2, 1));
+    // A first round that affords no simulation leaves the root as it is: the second asks.
+    let config = Config { action_priors: ActionPriors::Full, ..config(Budget::Simulations(3), 1) };
+    let mut late = Pomcp::new(config.with_early_stop(9, 1e-9)).unwrap();
+    let late = late.search(&model, &START, &Advisor, 1, &mut rng(0));
+    assert_eq!((visits(&late)[0], visits(&late).iter().sum::<u64>()), (0, 1003));
 }
 
 #[test]
