@@ -25,8 +25,11 @@ fn limited(log: &Log) -> Vec<Channel> {
     all.filter(|channel| log.has(*channel)).collect()
 }
 
-/// Readings that follow each other, by episode.
-fn readings(log: &Log, channel: Channel) -> Vec<Vec<(usize, f64)>> {
+/// Rows and readings of a column, by episode.
+type Column = Vec<Vec<(usize, f64)>>;
+
+/// Readings that follow each other.
+fn readings(log: &Log, channel: Channel) -> Column {
     let of = |episode: &Episode| {
         let cells = episode.channels.get(&channel);
         cells.into_iter().flat_map(|cells| cells.iter().enumerate()).filter_map(|(row, v)| Some((row, v?))).collect()
@@ -114,9 +117,9 @@ pub(crate) fn dead_axes(log: &Log) -> Option<Suspicion> {
 
 /// The dead ones of the axes of a sensor, with what they read.
 fn dead_of(log: &Log, axes: &[Channel]) -> Vec<(Channel, f64)> {
-    let read: Vec<(Channel, Vec<Vec<(usize, f64)>>)> =
+    let read: Vec<(Channel, Column)> =
         axes.iter().filter(|axis| log.has(**axis)).map(|axis| (*axis, readings(log, *axis))).collect();
-    let values = |read: &Vec<Vec<(usize, f64)>>| read.iter().flatten().map(|(_, value)| *value).collect::<Vec<f64>>();
+    let values = |read: &Column| read.iter().flatten().map(|(_, value)| *value).collect::<Vec<f64>>();
     let (mut dead, mut fine) = (Vec::new(), false);
     for (channel, read) in &read {
         let all = values(read);
