@@ -405,7 +405,7 @@ fn toml_and_urdf_that_are_empty_or_cut_off_are_answered_in_words() {
     refused(
         "scenario",
         "check D1 --set planner.budget=5",
-        &["`planner.budget`", "expected a name, or a table with one key"],
+        &["`planner.budget`", "expected one of { simulations = … }, { transitions = … }"],
     );
     assert!(!out.exists(), "a refused run leaves nothing behind");
 }
