@@ -3,15 +3,19 @@
 //! Every good log is spoilt in every way that it can be, one at a time. A fault *can be seen* in a log if the rules of rest, contact and force, at the readings that the
 //! log was spoilt from, tell it from the good log by a margin: a cube's exchanged lengths cannot, nor the sign of a force that was not measured.
 
+mod spoil;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result};
 use log_check::{Check, Kind, Reading, check};
-use measured_log::{Channel, Format, Log, Notes, Readings, Shape};
+use measured_log::{Channel, Format, Log, Notes};
 use rayon::prelude::*;
 use serde::Serialize;
 use statistics::wilson95;
+
+use spoil::{away, change, clip, glitch, has_part, jitter, turn_one};
 
 /// A way to spoil a log.
 #[derive(Clone, Copy, Debug)]
@@ -246,25 +250,7 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
     let force = Channel::WristForce(measured_log::Axis::X);
     let kind = match fault {
         Fault::Meant(reading, kind) => {
-            let shape = &log.header.object.shape;
-            let can = match reading {
-                Reading::Conjugate | Reading::RealLast | Reading::BodyTurned(_) => {
-                    has(Channel::ObjectOrientation(measured_log::Component::W))
-                }
-                Reading::LengthsSwapped(..) => matches!(shape, Shape::Box { .. }),
-                Reading::RadiusScaled(_) => matches!(shape, Shape::Cylinder { .. }),
-                Reading::ToolRadiusScaled(_) => log.header.tool_radius_m.is_some(),
-                Reading::Wrench(_) | Reading::ForceScaled(_) => has(force),
-                Reading::TorqueAbout(_) => has(Channel::WristTorque(measured_log::Axis::X)),
-                Reading::AddedMassScaled(_) => log.episodes.iter().any(|episode| {
-                    episode
-                        .channels
-                        .get(&Channel::AddedMass)
-                        .is_some_and(|cells| cells.iter().flatten().any(|mass| mass > 0.0))
-                }),
-                _ => true,
-            };
-            can.then_some(())?;
+            has_part(log, reading).then_some(())?;
             spoilt = reading.apply(log);
             *kind
         }
@@ -277,24 +263,12 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
         }
         Fault::Glitch => {
             has(force).then_some(())?;
-            let middle = spoilt.episodes.len() / 2;
-            let episode = &mut spoilt.episodes[middle];
-            let cells = episode.channels.get(&force)?;
-            let row = (cells.len() / 2..cells.len()).find(|row| cells.get(*row).is_some())?;
-            let new: Readings =
-                cells.iter().enumerate().map(|(i, value)| if i == row { Some(1000.0) } else { value }).collect();
-            episode.channels.insert(force, new);
+            glitch(&mut spoilt)?;
             Kind::Outliers
         }
         Fault::Clipped => {
             has(force).then_some(())?;
-            let axes = measured_log::Axis::ALL.map(Channel::WristForce);
-            let cells = |axis| spoilt.episodes.iter().filter_map(move |episode| episode.channels.get(&axis));
-            let all = axes.into_iter().flat_map(cells).flat_map(Readings::iter).flatten();
-            let limit = statistics::nearest_rank(all.map(f64::abs), 0.97)?;
-            change(&mut spoilt, |channel, _, value| {
-                if matches!(channel, Channel::WristForce(_)) { value.clamp(-limit, limit) } else { value }
-            });
+            clip(&mut spoilt)?;
             Kind::Clipped
         }
         Fault::DeadAxis => {
@@ -304,44 +278,15 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
             Kind::DeadSensor
         }
         Fault::Away => {
-            let x = Channel::ObjectPosition(measured_log::Axis::X);
-            let middle = spoilt.episodes.len() / 2;
-            let cells = spoilt.episodes[middle].channels.get(&x)?;
-            let read: Vec<usize> = (0..cells.len()).filter(|row| cells.get(*row).is_some()).collect();
-            let away = read.get(read.len() / 3..read.len() / 3 + 3)?.to_vec();
-            let new: Readings = cells
-                .iter()
-                .enumerate()
-                .map(|(row, value)| value.map(|value| if away.contains(&row) { value + 0.2 } else { value }))
-                .collect();
-            spoilt.episodes[middle].channels.insert(x, new);
+            away(&mut spoilt)?;
             Kind::Outliers
         }
         Fault::OneTurned => {
-            let mut turned = Reading::TrackerTurned(1).apply(log);
-            // Near the origin a turn changes little.
-            let far = |a: &measured_log::Episode, b: &measured_log::Episode| {
-                place(a).zip(place(b)).is_some_and(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) > 0.1)
-            };
-            let moved = |index: &usize| {
-                far(&log.episodes[*index], &turned.episodes[*index])
-                    && way_m(&log.episodes[*index]).is_some_and(|way_m| way_m > 0.01)
-                    && rests_first(&log.episodes[*index])
-            };
-            let index = (log.episodes.len() / 2..log.episodes.len()).find(moved)?;
-            spoilt.episodes[index] = turned.episodes.swap_remove(index);
+            turn_one(&mut spoilt)?;
             Kind::Geometry
         }
         Fault::Jitter => {
-            let late_secs = 0.33 * log_check::check(log, None).clock?.period_secs;
-            for (number, episode) in spoilt.episodes.iter_mut().enumerate() {
-                for (row, secs) in episode.time_secs.iter_mut().enumerate().skip(1) {
-                    // Without a generator: the fractional parts of a row's multiples of the golden section are uniform.
-                    *secs += late_secs * (0.618_034 * (row + 37 * number) as f64).fract();
-                }
-                let increasing = episode.time_secs.windows(2).all(|pair| pair[0] < pair[1]);
-                increasing.then_some(())?;
-            }
+            jitter(&mut spoilt)?;
             Kind::Jitter
         }
         Fault::Stretched => {
@@ -361,37 +306,6 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
     };
     spoilt.checked(Path::new("log.toml"), Path::new("samples.csv")).ok()?;
     Some((spoilt, kind))
-}
-
-/// Whether an object stays where it is at first for 0.3 s, to 2 mm.
-fn rests_first(episode: &measured_log::Episode) -> bool {
-    let Some(first) = place(episode) else { return false };
-    let begun = episode.time_secs[0];
-    let rows = (0..episode.rows()).take_while(|row| episode.time_secs[*row] - begun < 0.3);
-    let mut places = rows.filter_map(|row| episode.vector(Channel::ObjectPosition, row));
-    places.all(|place| (place[0] - first[0]).hypot(place[1] - first[1]) < 0.002)
-}
-
-/// Where an object is at first, m.
-fn place(episode: &measured_log::Episode) -> Option<[f64; 3]> {
-    (0..episode.rows()).find_map(|row| episode.vector(Channel::ObjectPosition, row))
-}
-
-/// How far an object comes in an episode, along x and y together, m.
-fn way_m(episode: &measured_log::Episode) -> Option<f64> {
-    let mut places = (0..episode.rows()).filter_map(|row| episode.vector(Channel::ObjectPosition, row));
-    let first = places.next()?;
-    let last = places.next_back()?;
-    Some((last[0] - first[0]).hypot(last[1] - first[1]))
-}
-
-fn change(log: &mut Log, new: impl Fn(Channel, usize, f64) -> f64) {
-    for episode in &mut log.episodes {
-        for (channel, cells) in &mut episode.channels {
-            *cells =
-                cells.iter().enumerate().map(|(row, value)| value.map(|value| new(*channel, row, value))).collect();
-        }
-    }
 }
 
 impl Table {

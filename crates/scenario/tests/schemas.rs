@@ -113,6 +113,7 @@ fn problem(root: &Value, schema: &Value, value: &Value, key: &str) -> Option<Str
         match keyword.as_str() {
             "$ref" => problem(root, root.pointer(&rule.as_str().unwrap()[1..]).unwrap(), value, key),
             "allOf" => list().iter().find_map(|rule| problem(root, rule, value, key)),
+            "anyOf" => fail(list().iter().any(fits)),
             "oneOf" => fail(list().iter().filter(|rule| fits(rule)).count() == 1),
             "type" => fail(match rule.as_str().unwrap() {
                 "object" => value.is_object(),
@@ -121,6 +122,7 @@ fn problem(root: &Value, schema: &Value, value: &Value, key: &str) -> Option<Str
                 "boolean" => value.is_boolean(),
                 "integer" => value.is_i64() || value.is_u64(),
                 "number" => value.is_number(),
+                "null" => value.is_null(),
                 other => panic!("{key}: type {other}"),
             }),
             "const" => fail(rule == value),
