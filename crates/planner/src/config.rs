@@ -1,6 +1,6 @@
 //! Settings of a search.
 
-use crate::{Choice, Error};
+use crate::{Choice, EarlyStop, Error};
 
 /// Settings of [`crate::Pomcp`] and [`crate::Pomcpow`].
 ///
@@ -102,26 +102,6 @@ pub enum Budget {
     /// Wall-clock time, ms. No simulation starts later, and every tree makes at least one. For live use only: the same
     /// seed may give another result.
     Milliseconds(u64),
-}
-
-/// Ends a search that has little left to gain.
-///
-/// The budget is spent in `rounds` equal parts. After each, the search ends if exact values of all actions could be expected to add at most `gain` to
-/// the decision. This is the largest expected improvement E[max(0, V(a) − V(best))] of another legal action, for a difference that is normal about that
-/// of the mean returns. The standard error of a mean is the standard deviation of an action's returns at the root in this search over √N(ha);
-/// actions with few returns borrow from the spread of all. N(ha) counts what was kept from earlier searches and initial visits, as the mean does. So a search ends where one action is clearly the best, and also where several are
-/// equally good. Such a value of information as a rule to stop is that of Hay, Russell, Tolpin and Shimony, "Selecting computations: theory and
-/// applications" (UAI 2012). Returns of one tree are not independent, as the tree learns: the figure is an estimate, not a bound. While all
-/// returns are equal nothing is known, and the search goes on. With a budget of time each round may end one simulation late.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct EarlyStop {
-    /// Equal parts of the budget. At least 2.
-    pub rounds: usize,
-    /// Expected improvement that is too small to search on for, in units of reward. Positive.
-    pub gain: f64,
 }
 
 /// Constant c of UCB1.
@@ -282,13 +262,6 @@ impl Config {
         Self { branch_states, ..self }
     }
 
-    /// Ends a search before its budget is spent where exact values could be expected to add at most `gain` (positive, in units of reward), which is
-    /// asked after each of `rounds` parts of the budget (at least 2). Start with 6 rounds and a hundredth of a typical return.
-    #[must_use]
-    pub fn with_early_stop(self, rounds: usize, gain: f64) -> Self {
-        Self { early_stop: Some(EarlyStop { rounds, gain }), ..self }
-    }
-
     /// Most nodes of all trees together. At least one a tree.
     #[must_use]
     pub fn with_nodes(self, nodes: usize) -> Self {
@@ -333,11 +306,7 @@ impl Config {
         let nodes = self.nodes;
         let limit = format!("at least trees = {trees}, at most 2³²");
         require(nodes >= trees && nodes as u64 <= 1 << 32, "nodes", &nodes, limit)?;
-        if let Some(EarlyStop { rounds, gain }) = self.early_stop {
-            require((2..=1000).contains(&rounds), "early_stop.rounds", &rounds, "between 2 and 1000")?;
-            let positive = gain.is_finite() && gain > 0.0;
-            require(positive, "early_stop.gain", &gain, "finite and positive")?;
-        }
+        self.early_stop.map_or(Ok(()), EarlyStop::validate)?;
         if let Observations::Widening { factor, exponent } = self.observations {
             let positive = factor.is_finite() && factor > 0.0;
             require(positive, "observations.widening.factor", &factor, "finite and positive")?;
@@ -352,23 +321,18 @@ impl Config {
     }
 }
 
-fn require(holds: bool, key: &'static str, value: &dyn ToString, limit: impl Into<String>) -> Result<(), Error> {
+pub(crate) fn require(
+    holds: bool,
+    key: &'static str,
+    value: &dyn ToString,
+    limit: impl Into<String>,
+) -> Result<(), Error> {
     if holds { Ok(()) } else { Err(Error::Config { key, value: value.to_string(), limit: limit.into() }) }
 }
 
 /// The part of `total` that tree number `index` of `trees` gets: as even as possible, the first trees one more.
 pub(crate) fn share(total: usize, trees: usize, index: usize) -> usize {
     total / trees + usize::from(index < total % trees)
-}
-
-impl RolloutDepth {
-    /// Actions of a rollout that has `left` actions until the horizon of its simulation.
-    pub(crate) fn actions(self, left: usize) -> usize {
-        match self {
-            Self::Full => left,
-            Self::Actions(n) => n.min(left),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -460,7 +424,7 @@ mod tests {
         };
         assert_eq!(config().validate(), Ok(()));
         type Change = fn(&mut Config);
-        let expected: [(Change, &str); 13] = [
+        let expected: [(Change, &str); 11] = [
             (|c| c.depth = 0, "`depth` is 0, but must be at least 1"),
             (|c| c.trees = 0, "`trees` is 0, but must be at least 1"),
             (|c| c.threads = 0, "`threads` is 0, but must be at least 1"),
@@ -486,8 +450,6 @@ mod tests {
                 |c| c.observations = Observations::Widening { factor: 1.0, exponent: 1.5 },
                 "`observations.widening.exponent` is 1.5, but must be between 0 and 1",
             ),
-            (|c| *c = config().with_early_stop(1, 3.0), "`early_stop.rounds` is 1, but must be between 2 and 1000"),
-            (|c| *c = config().with_early_stop(4, 0.0), "`early_stop.gain` is 0, but must be finite and positive"),
             (
                 |c| c.exploration = Exploration::Fixed(f64::NAN),
                 "`exploration.fixed` is NaN, but must be finite and not negative",
@@ -522,13 +484,6 @@ mod tests {
         assert_eq!(d().with_early_stop(6, 3.0), Config { early_stop, ..d() });
         assert_eq!(d().with_nodes(50), Config { nodes: 50, ..d() });
         assert_eq!(d().with_trees(4, 2), Config { trees: 4, threads: 2, ..d() });
-    }
-
-    #[test]
-    fn a_rollout_never_passes_the_horizon() {
-        assert_eq!(RolloutDepth::Full.actions(7), 7);
-        assert_eq!(RolloutDepth::Actions(3).actions(7), 3);
-        assert_eq!(RolloutDepth::Actions(9).actions(7), 7);
     }
 
     #[test]

@@ -1,6 +1,45 @@
 //! What a decision could still gain from more simulations.
 
-use crate::ActionStats;
+use crate::config::require;
+use crate::{ActionStats, Config, Error};
+
+/// Ends a search that has little left to gain.
+///
+/// The budget is spent in `rounds` equal parts. After each, the search ends if exact values of all actions could be expected to add at most `gain` to
+/// the decision. This is the largest expected improvement E[max(0, V(a) − V(best))] of another legal action, for a difference that is normal about that
+/// of the mean returns. The standard error of a mean is the standard deviation of an action's returns at the root in this search over √N(ha);
+/// actions with few returns borrow from the spread of all. N(ha) counts what was kept from earlier searches and initial visits, as the mean does. So a search ends where one action is clearly the best, and also where several are
+/// equally good. Such a value of information as a rule to stop is that of Hay, Russell, Tolpin and Shimony, "Selecting computations: theory and
+/// applications" (UAI 2012). Returns of one tree are not independent, as the tree learns: the figure is an estimate, not a bound. While all
+/// returns are equal nothing is known, and the search goes on. With a budget of time each round may end one simulation late.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct EarlyStop {
+    /// Equal parts of the budget. At least 2.
+    pub rounds: usize,
+    /// Expected improvement that is too small to search on for, in units of reward. Positive.
+    pub gain: f64,
+}
+
+impl EarlyStop {
+    /// Checks both values against their limits.
+    pub(crate) fn validate(self) -> Result<(), Error> {
+        let Self { rounds, gain } = self;
+        require((2..=1000).contains(&rounds), "early_stop.rounds", &rounds, "between 2 and 1000")?;
+        require(gain.is_finite() && gain > 0.0, "early_stop.gain", &gain, "finite and positive")
+    }
+}
+
+impl Config {
+    /// Ends a search before its budget is spent where exact values could be expected to add at most `gain` (positive, in units of reward), which is
+    /// asked after each of `rounds` parts of the budget (at least 2). Start with 6 rounds and a hundredth of a typical return.
+    #[must_use]
+    pub fn with_early_stop(self, rounds: usize, gain: f64) -> Self {
+        Self { early_stop: Some(EarlyStop { rounds, gain }), ..self }
+    }
+}
 
 /// Count, mean and spread of returns (Welford 1962).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -109,6 +148,15 @@ mod tests {
                 prop_assert!((moments.squares - squares).abs() < 1e-6);
             }
         }
+    }
+
+    #[test]
+    fn values_outside_their_limits_are_refused() {
+        let message =
+            |rounds, gain| Config::default().with_early_stop(rounds, gain).validate().unwrap_err().to_string();
+        assert_eq!(message(1, 3.0), "planner: `early_stop.rounds` is 1, but must be between 2 and 1000");
+        assert_eq!(message(4, 0.0), "planner: `early_stop.gain` is 0, but must be finite and positive");
+        assert_eq!(Config::default().with_early_stop(4, 0.1).validate(), Ok(()));
     }
 
     #[test]

@@ -83,8 +83,9 @@ mod tree;
 mod ucb;
 mod widening;
 
-pub use config::{ActionPriors, Backup, Budget, Config, EarlyStop, Exploration, Observations, RolloutDepth};
+pub use config::{ActionPriors, Backup, Budget, Config, Exploration, Observations, RolloutDepth};
 pub use error::Error;
 pub use export::{ExportLimit, TreeAction, TreeBranch, TreeNode};
+pub use gain::EarlyStop;
 pub use pomcp::{Planner, Pomcp, Pomcpow, SearchReport, Stop};
 pub use ucb::{ActionStats, Choice};

@@ -2,6 +2,8 @@
 
 use pomdp::{GenerativeModel, Outcome, Policy, Rng};
 
+use crate::RolloutDepth;
+
 /// What a rollout brought.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rollout {
@@ -42,6 +44,16 @@ where
         result.discounted_return += weight * policy.leaf_value(model, state, left - result.transitions);
     }
     result
+}
+
+impl RolloutDepth {
+    /// Actions of a rollout that has `left` actions until the horizon of its simulation.
+    pub(crate) fn actions(self, left: usize) -> usize {
+        match self {
+            Self::Full => left,
+            Self::Actions(n) => n.min(left),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -118,5 +130,12 @@ mod tests {
         assert_eq!(run(100, 0, 9), 4.5);
         assert_eq!(run(100, 2, 2), 1.5);
         assert_eq!(run(2, 2, 9), 1.5);
+    }
+
+    #[test]
+    fn a_rollout_never_passes_the_horizon() {
+        assert_eq!(RolloutDepth::Full.actions(7), 7);
+        assert_eq!(RolloutDepth::Actions(3).actions(7), 3);
+        assert_eq!(RolloutDepth::Actions(9).actions(7), 7);
     }
 }
