@@ -87,7 +87,8 @@ pub(crate) fn open_gain(stats: &[ActionStats], returns: &[Moments], legal: &[boo
         return f64::INFINITY;
     }
     let pooled = returns.iter().map(|r| r.squares).sum::<f64>() / freedom;
-    if pooled == 0.0 {
+    let tried = || stats.iter().filter(|action| action.visits > 0);
+    if pooled == 0.0 && tried().all(|action| action.value == stats[best].value) {
         // Returns that have all been equal so far are no proof that others are: a goal may not have been found yet.
         return f64::INFINITY;
     }
@@ -201,5 +202,11 @@ mod tests {
         assert_eq!(unknown, f64::INFINITY, "nothing was simulated");
         let same = [of(&[-2.85; 8]), of(&[-2.85; 8])];
         assert_eq!(open_gain(&stats(&same), &same, &[true; 2], 0), f64::INFINITY, "no return has differed so far");
+        let apart = [of(&[5.0; 8]), of(&[-2.85; 8])];
+        assert_eq!(
+            open_gain(&stats(&apart), &apart, &[true; 2], 0),
+            0.0,
+            "each action has one return, and one is better"
+        );
     }
 }
