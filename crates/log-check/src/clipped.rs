@@ -1,7 +1,8 @@
 //! Sensors that read no more than their limit, and axes of a sensor that read nothing.
 
-use measured_log::{Axis, Channel, Episode, Log};
+use measured_log::{Axis, Channel, Log};
 
+use crate::sensors::{self, DEAD_ROWS};
 use crate::suspicion::{Kind, Suspicion};
 
 /// Readings that stay exactly at the limit for so many rows make a run; so many rows in runs are no chance.
@@ -14,8 +15,6 @@ const DISTINCT: f64 = 0.5;
 const FINE_ROWS: usize = 5;
 /// Resolution, as a share of an axis's range, with which an axis that is hardly loaded changes too.
 const FINE: f64 = 0.005;
-/// Readings after which an axis that never changes is dead, if the others change.
-const DEAD_ROWS: usize = 50;
 
 /// Forces and torques, whose sensors have a limit.
 fn limited(log: &Log) -> Vec<Channel> {
@@ -30,11 +29,7 @@ type Column = Vec<Vec<(usize, f64)>>;
 
 /// Readings that follow each other.
 fn readings(log: &Log, channel: Channel) -> Column {
-    let of = |episode: &Episode| {
-        let cells = episode.channels.get(&channel);
-        cells.into_iter().flat_map(|cells| cells.iter().enumerate()).filter_map(|(row, v)| Some((row, v?))).collect()
-    };
-    log.episodes.iter().map(of).collect()
+    log.episodes.iter().map(|episode| sensors::readings(episode, channel).collect()).collect()
 }
 
 /// Columns that stay at their largest or smallest reading, where they change from row to row elsewhere.

@@ -7,7 +7,7 @@ use crate::clipped::{clipped, dead_axes};
 use crate::suspicion::{Kind, Suspicion};
 
 /// Rows after which a sensor that never changes is dead, if others do.
-const DEAD_ROWS: usize = 50;
+pub(crate) const DEAD_ROWS: usize = 50;
 /// A spike is this many times larger than what its neighbours, and nine in ten of all readings, differ from each other by.
 const SPIKE: f64 = 8.0;
 /// Rows, and seconds, in which a reading can be away and come back; what moves takes longer.
@@ -83,7 +83,7 @@ fn groups(log: &Log) -> Vec<Vec<Channel>> {
 }
 
 /// Readings of a column with the indices of their rows.
-fn readings(episode: &Episode, channel: Channel) -> impl Iterator<Item = (usize, f64)> + '_ {
+pub(crate) fn readings(episode: &Episode, channel: Channel) -> impl Iterator<Item = (usize, f64)> + '_ {
     episode
         .channels
         .get(&channel)
