@@ -41,13 +41,14 @@ def simulate(world, plan):
     return [world.run(episode) for episode in plan]
 
 
-def compared(with_it, without, stamps, effects, rig):
-    """`detectable`: the mean square, in noise standard deviations, by which readings of the episodes differ with and without the effects."""
+def compared(with_it, without, stamps, effects, rig, others=None):
+    """`detectable`: the mean square, in noise standard deviations, by which readings of the episodes differ with `effects` and with `others` alone.
+    Episodes that an engine ended at once are left out."""
     total, count = 0.0, 0
     for a, b, times in zip(with_it, without, stamps):
         if len(a.time_s) < 3 or len(b.time_s) < 3:
             continue
-        t, n = sensors.difference(sensors.read(a, times, effects, rig), sensors.read(b, times, {}, rig), rig)
+        t, n = sensors.difference(sensors.read(a, times, effects, rig), sensors.read(b, times, others or {}, rig), rig)
         total, count = total + t, count + n
     return total / max(count, 1)
 
@@ -109,21 +110,12 @@ def try_log(rng, engine, variant, simulate=simulate):
             each = {}
             if kind == "pair":
                 for name in effects:
-                    alone = World(scene, {n: p for n, p in effects.items() if n != name}, engine, variant)
+                    others = {n: p for n, p in effects.items() if n != name}
+                    alone = World(scene, others, engine, variant)
                     rest = [alone.run(plan[i]) for i in some]
-                    each[name] = compared_pair([traces[i] for i in some], rest, [stamps[i] for i in some], effects, name, rig)
+                    each[name] = compared([traces[i] for i in some], rest, [stamps[i] for i in some], effects, rig, others)
             return rng, scene, rig, kind, effects, plan, stamps, traces, seen, each
     raise Faint(f"no effect of kind {kind} shows in 12 draws")
-
-
-def compared_pair(with_it, without, stamps, effects, name, rig):
-    """As `compared`, of one of a pair: against the other alone."""
-    others = {n: p for n, p in effects.items() if n != name}
-    total, count = 0.0, 0
-    for a, b, times in zip(with_it, without, stamps):
-        t, n = sensors.difference(sensors.read(a, times, effects, rig), sensors.read(b, times, others, rig), rig)
-        total, count = total + t, count + n
-    return total / max(count, 1)
 
 
 def probe(bare, full, plan, stamps, some, effects, rig):
