@@ -1,9 +1,11 @@
 //! How often decisions are right, on logs whose truth is known.
 
+use discrepancy::are_twins;
 use discrepancy::decision::Probabilities;
+use physics_model::EffectKind;
 use serde::Serialize;
 
-use crate::learn::{Example, Kind};
+use crate::learn::{Judgement, Kind, Truth};
 
 /// Edges of the bins of that mean square in which names are counted. Two good engines without an effect differ by tens to hundreds (`tests/peers/worlds/gap.py`).
 const EDGES: [f64; 2] = [30.0, 300.0];
@@ -15,7 +17,9 @@ const FEW: usize = 11;
 pub struct Judged {
     /// Logs with an effect of the catalogue that shows, and how many of them it is named in.
     pub effects: [u32; 2],
-    /// The same by the name alone, whatever the verdict.
+    /// Of the others, in how many an effect is named that does nearly the same.
+    pub twins: u32,
+    /// Logs whose most probable effect is right, whatever the verdict.
     pub first: u32,
     /// Logs with such an effect where it was among those that were compared.
     pub compared: u32,
@@ -50,9 +54,10 @@ pub struct Judged {
 /// Of logs whose effect was withheld from what was compared: how many, how many are called `unknown`, how many get a name, and one with a confidence of 0.9
 /// and more.
 #[must_use]
-pub fn judge_withheld(judged: &[(&Example, Probabilities)]) -> [u32; 4] {
+pub fn judge_withheld(judged: &[Judgement]) -> [u32; 4] {
     use discrepancy::Verdict;
-    let count = |of: &dyn Fn(&Probabilities) -> bool| judged.iter().filter(|(_, found)| of(found)).count() as u32;
+    let count =
+        |of: &dyn Fn(&Probabilities) -> bool| judged.iter().filter(|judgement| of(&judgement.found)).count() as u32;
     [
         judged.len() as u32,
         count(&|found| found.verdict() == Verdict::Unknown),
@@ -61,13 +66,20 @@ pub fn judge_withheld(judged: &[(&Example, Probabilities)]) -> [u32; 4] {
     ]
 }
 
+/// Whether an effect does nearly the same as one of what is hidden.
+fn names_twin(truth: &Truth, name: &str) -> bool {
+    let kind = |name: &str| name.parse::<EffectKind>().ok();
+    let twin = |hidden: &str| kind(hidden).zip(kind(name)).is_some_and(|(hidden, named)| are_twins([hidden, named]));
+    truth.effects.iter().any(|hidden| twin(&hidden.name))
+}
+
 /// Counts over judged examples.
 #[must_use]
-pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
+pub fn judge(judged: &[Judgement]) -> Judged {
     use discrepancy::Verdict;
     let mut counts = Judged { logs: judged.len() as u32, ..Judged::default() };
     let mut bins = [(0.0, 0_u32, 0_u32); 10];
-    for (example, found) in judged {
+    for Judgement { example, found, width } in judged {
         let (verdict, (name, probability)) = (found.verdict(), found.best());
         let hidden = example.truth.kind() == Kind::Effect;
         let right = hidden && example.truth.names(name);
@@ -82,6 +94,7 @@ pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
                 let named = right && verdict == Verdict::Effect;
                 *bin = [bin[0] + 1, bin[1] + u32::from(compared), bin[2] + u32::from(named)];
                 counts.effects[1] += u32::from(right && verdict == Verdict::Effect);
+                counts.twins += u32::from(!right && verdict == Verdict::Effect && names_twin(&example.truth, name));
             }
             Kind::None => {
                 counts.none[0] += 1;
@@ -101,8 +114,8 @@ pub fn judge(judged: &[(&Example, Probabilities)]) -> Judged {
         let bin = &mut bins[((probability * 10.0) as usize).min(9)];
         *bin = (bin.0 + probability, bin.1 + u32::from(right), bin.2 + 1);
         if right {
-            counts.intervals[0] += example.covered.len() as u32;
-            counts.intervals[1] += example.covered.iter().filter(|covered| **covered).count() as u32;
+            counts.intervals[0] += example.off.len() as u32;
+            counts.intervals[1] += example.off.iter().filter(|off| *off <= width).count() as u32;
         }
         counts.log_loss -= example.of_label(found).ln() / judged.len() as f64;
         counts.rollouts += example.rollouts as f64 / judged.len() as f64;

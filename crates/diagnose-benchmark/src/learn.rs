@@ -25,6 +25,8 @@ use crate::plan::{self, Plan};
 
 /// Prior variances of a weight of a standardised feature, of which the one is taken that predicts engines best that were left out.
 const VARIANCES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
+/// No interval says anything that is wider than this many times what our own engine's logs ask for.
+const WIDEST: f64 = 100.0;
 /// That of an offset: hardly any prior.
 const OFFSET: f64 = 100.0;
 /// A mean square difference, in those of noise, by which an effect changes its episodes, below which nothing shows.
@@ -116,8 +118,15 @@ impl Truth {
 struct Answer {
     findings: Vec<Vec<Findings>>,
     effects: Vec<Answered>,
+    /// By how much its intervals were widened.
+    #[serde(default = "plain_width")]
+    interval_width: f64,
     rollouts: u64,
     seconds: f64,
+}
+
+fn plain_width() -> f64 {
+    1.0
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -129,8 +138,21 @@ struct Answered {
 #[derive(Clone, Debug, Deserialize)]
 struct Value {
     key: String,
+    value: f64,
     /// JSON has no infinity: an end that is none is one.
     interval90: [Option<f64>; 2],
+}
+
+impl Value {
+    /// How far `truth` is away from the value, as a share of how far the interval reaches to that side.
+    fn off(&self, truth: f64) -> f64 {
+        let [low, high] = self.interval90;
+        let end = if truth > self.value { high } else { low };
+        match (truth - self.value, end.map(|end| end - self.value)) {
+            (0.0, _) | (_, None) => 0.0,
+            (away, Some(reach)) => (away.abs() / reach.abs()).min(f64::INFINITY),
+        }
+    }
 }
 
 /// A log with its answer.
@@ -142,8 +164,8 @@ pub struct Example {
     pub truth: Truth,
     /// What speaks for each effect that was compared, but for those that the engine has by nature.
     pub findings: Vec<Findings>,
-    /// Whether the 90 % interval of each parameter of a rightly named effect holds its value.
-    pub covered: Vec<bool>,
+    /// Of each parameter of a rightly named effect, how far its true value is away, as a share of how far an interval of width 1 reaches to that side.
+    pub off: Vec<f64>,
     /// Simulated episodes.
     pub rollouts: u64,
     /// Duration, s.
@@ -270,18 +292,16 @@ fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
         let natural = truth.natural.contains(&found.effect) && !truth.names(&found.effect);
         !found.effect.is_empty() && !natural
     });
-    let covered = (answer.effects.iter())
+    let off = (answer.effects.iter())
         .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
         .flat_map(|(named, effect)| {
-            let holds = |value: &Value| {
-                let [low, high] = value.interval90;
-                let (low, high) = (low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY));
-                effect.parameters.get(&value.key)?.as_f64().map(|truth| (low..=high).contains(&truth))
+            let off = |value: &Value| {
+                effect.parameters.get(&value.key)?.as_f64().map(|truth| value.off(truth) * answer.interval_width)
             };
-            named.parameters.iter().filter_map(holds).collect::<Vec<_>>()
+            named.parameters.iter().filter_map(off).collect::<Vec<_>>()
         })
         .collect();
-    Some(Example { log, truth, findings, covered, rollouts: answer.rollouts, seconds: answer.seconds, withheld: false })
+    Some(Example { log, truth, findings, off, rollouts: answer.rollouts, seconds: answer.seconds, withheld: false })
 }
 
 /// The decision that examples teach. How far weights may go is what predicts best the engines among them that are left out, each in turn.
@@ -300,17 +320,25 @@ pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
     regress(examples, best.map_or(VARIANCES[0], |(_, variance)| variance), provenance)
 }
 
+/// Share of the true values that an interval is to hold.
+const HELD: f64 = 0.9;
+
+/// The width at which intervals hold that share of the true values of a further log like these (split conformal prediction: Vovk et al., "Algorithmic
+/// Learning in a Random World", 2005); 1 where nothing is known.
+fn width(examples: &[&Example]) -> f64 {
+    let mut off: Vec<f64> = examples.iter().flat_map(|example| example.off.iter().copied()).collect();
+    off.sort_by(f64::total_cmp);
+    let place = (HELD * (off.len() + 1) as f64).ceil() as usize;
+    // Of few none is wide enough; the widest has to do.
+    off.get(place.min(off.len()).saturating_sub(1)).map_or(1.0, |width| width.clamp(f64::EPSILON, WIDEST))
+}
+
 /// The engines of examples, each once.
 fn engines<'a>(examples: &[&'a Example]) -> Vec<&'a str> {
     let mut engines: Vec<&str> = examples.iter().map(|example| example.truth.engine.as_str()).collect();
     engines.sort_unstable();
     engines.dedup();
     engines
-}
-
-/// Largest ln evidence of what was compared.
-fn most(findings: &[Findings]) -> f64 {
-    findings.iter().map(|found| found.log_evidence).fold(f64::NEG_INFINITY, f64::max)
 }
 
 fn scales(names: &[&str], rows: &[Vec<f64>]) -> Vec<Scale> {
@@ -326,8 +354,7 @@ fn scales(names: &[&str], rows: &[Vec<f64>]) -> Vec<Scale> {
 
 fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) -> Decision {
     let of_effects = |example: &Example| -> Vec<Vec<f64>> {
-        let most = most(&example.findings);
-        example.findings.iter().map(|found| effect_features(found, most).to_vec()).collect()
+        example.findings.iter().map(|found| effect_features(found, &example.findings).to_vec()).collect()
     };
     let of_log = |example: &Example| log_features(&example.findings).to_vec();
     let rows: Vec<Vec<f64>> = examples.iter().flat_map(|example| of_effects(example)).collect();
@@ -369,17 +396,37 @@ fn regress(examples: &[&Example], variance: f64, provenance: serde_json::Value) 
         unknown: score(2),
         effect_features: effect_scales,
         log_features: log_scales,
+        width: width(examples),
     }
 }
 
-/// Every example of `judged` with the probabilities of what the other engines of `taught` teach.
+/// An example with what a decision says of it.
+#[derive(Clone, Debug)]
+pub struct Judgement<'a> {
+    /// The log and its answer.
+    pub example: &'a Example,
+    /// What it shows.
+    pub found: Probabilities,
+    /// Width of its intervals.
+    pub width: f64,
+}
+
+impl<'a> Judgement<'a> {
+    /// By a decision that was made from other logs.
+    #[must_use]
+    pub fn new(example: &'a Example, decision: &Decision) -> Self {
+        Self { example, found: decision.probabilities(&example.findings), width: decision.width }
+    }
+}
+
+/// Every example of `judged` by what the other engines of `taught` teach.
 #[must_use]
-pub fn leave_one_engine_out<'a>(taught: &[Example], judged: &'a [Example]) -> Vec<(&'a Example, Probabilities)> {
+pub fn leave_one_engine_out<'a>(taught: &[Example], judged: &'a [Example]) -> Vec<Judgement<'a>> {
     let of_engine = |engine: &str| {
         let others: Vec<&Example> = taught.iter().filter(|example| example.truth.engine != engine).collect();
         let decision = learn(&others, serde_json::Value::Null);
         let own = judged.iter().filter(|example| example.truth.engine == engine);
-        own.map(|example| (example, decision.probabilities(&example.findings))).collect::<Vec<_>>()
+        own.map(|example| Judgement::new(example, &decision)).collect::<Vec<_>>()
     };
     engines(&judged.iter().collect::<Vec<_>>()).into_iter().flat_map(of_engine).collect()
 }
@@ -406,30 +453,20 @@ mod tests {
         let findings = vec![Findings {
             effect: found.into(),
             log_evidence,
-            margin: log_evidence,
             whole: true,
             coordinates: 2,
-            steadiness: 1.0,
-            heldout_steadiness: 1.0,
-            drop: 0.0,
+            drop_steadiness: 1.0,
+            slow_drop: 0.0,
+            gain: 0.0,
+            median_gain: log_evidence,
+            force_gain: 0.0,
             before: 2.0,
-            after: 2.0,
             motion_after: 2.0,
-            force_after: 1.0,
             motion_share: [0.1; 2],
             force_share: [0.0; 2],
-            size: 1.0,
             episodes: [20, 4],
         }];
-        Example {
-            log: "log".into(),
-            truth,
-            findings,
-            covered: vec![true],
-            rollouts: 100,
-            seconds: 1.0,
-            withheld: false,
-        }
+        Example { log: "log".into(), truth, findings, off: vec![0.5], rollouts: 100, seconds: 1.0, withheld: false }
     }
 
     #[test]
@@ -447,8 +484,22 @@ mod tests {
         // On an engine where evidence says nothing the answers are wrong, and the table says so.
         examples.extend((0..10).map(|_| example("d", false, "tether", 300.0)));
         let judged = leave_one_engine_out(&examples, &examples);
-        let own: Vec<_> = judged.into_iter().filter(|(example, _)| example.truth.engine == "d").collect();
+        let own: Vec<_> = judged.into_iter().filter(|judgement| judgement.example.truth.engine == "d").collect();
         assert_eq!(judge(&own).false_alarms, 10);
+    }
+
+    #[test]
+    fn intervals_are_as_wide_as_nine_in_ten_true_values_ask_for() {
+        let mut all = vec![example("a", true, "table_tilt", 100.0); 19];
+        all.iter_mut().enumerate().for_each(|(place, example)| example.off = vec![0.1 * place as f64]);
+        // Of 19 and a further one 18 lie within: the 18th, 1.7.
+        let width_of = |all: &[Example]| width(&all.iter().collect::<Vec<_>>());
+        assert!((width_of(&all) - 1.7).abs() < 1e-12);
+        assert_eq!((width_of(&all[..3]), width_of(&[])), (0.2, 1.0));
+        let value = |interval90| Value { key: "slope_x_rad".into(), value: 1.0, interval90 };
+        assert_eq!([0.5, 1.0, 2.0].map(|truth| value([Some(0.0), Some(1.5)]).off(truth)), [0.5, 0.0, 2.0]);
+        // An end that is none holds everything; an interval that ends at its value nothing beyond.
+        assert_eq!([value([None, Some(2.0)]).off(-9.0), value([Some(1.0), Some(2.0)]).off(0.5)], [0.0, f64::INFINITY]);
     }
 
     #[test]

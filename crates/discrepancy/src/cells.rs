@@ -28,6 +28,8 @@ pub struct Cells {
     pub of: Vec<usize>,
     /// Number of cells.
     pub count: usize,
+    /// Channel and octave of each cell; none of [`Self::one`].
+    pub(crate) channels: Vec<(Kind, u32)>,
     /// Residuals of one component in one phase, one after another.
     pub(crate) runs: Vec<Range<usize>>,
 }
@@ -36,7 +38,7 @@ impl Cells {
     /// One cell of residuals that are left as they are.
     #[must_use]
     pub fn one(count: usize) -> Self {
-        Self { of: vec![0; count], count: 1, runs: Vec::new() }
+        Self { of: vec![0; count], count: 1, ..Self::default() }
     }
 
     /// Of blocks with these keys.
@@ -51,14 +53,18 @@ impl Cells {
             }
         }
         let mut places: BTreeMap<(Key, u32), usize> = BTreeMap::new();
-        let mut of = Vec::with_capacity(keys.len());
+        let (mut of, mut channels) = (Vec::with_capacity(keys.len()), Vec::new());
         for run in &runs {
+            let key = keys[run.start];
             for octave in octaves(run.len()) {
-                let next = places.len();
-                of.push(*places.entry((keys[run.start], octave)).or_insert(next));
+                let cell = *places.entry((key, octave)).or_insert_with(|| {
+                    channels.push((key.0, octave));
+                    channels.len() - 1
+                });
+                of.push(cell);
             }
         }
-        Self { of, count: places.len(), runs }
+        Self { of, count: channels.len(), channels, runs }
     }
 
     /// Residuals in the coordinates of the cells.

@@ -8,37 +8,36 @@
 
 use std::sync::OnceLock;
 
+use physics_model::EffectKind;
 use serde::{Deserialize, Serialize};
 
+use crate::begin::are_twins;
 use crate::findings::Findings;
 use crate::report::Verdict;
 
 /// Names of the features of an effect, in order.
-pub const EFFECT_FEATURES: [&str; 15] = [
-    "ln evidence",
-    "ln behind",
-    "steadiness",
-    "held-out steadiness",
-    "drop",
-    "ln before",
+pub const EFFECT_FEATURES: [&str; 12] = [
+    "lead",
+    "lead, explained",
+    "drop steadiness",
+    "slow drop",
+    "ln gain",
+    "median gain",
+    "force gain",
+    "force gain, explained",
+    "ln motion drop",
     "ln motion after",
-    "ln force after",
-    "ln motion share",
     "ln force share",
-    "ln size",
-    "size",
     "coordinates",
-    "ln evidence, explained",
-    "steadiness, explained",
 ];
 
 /// Names of the features of a log, in order.
 pub const LOG_FEATURES: [&str; 4] = ["ln before", "ln motion share", "ln force share", "ln episodes"];
 
-/// No evidence and no error is larger to a decision.
+/// No gain and no error is larger to a decision.
 const MOST: f64 = 1e6;
-/// No strength says more, in standard deviations of its prior.
-const FARTHEST: f64 = 12.0;
+/// A smaller gain of a residual in ln p says no more.
+const LEAST_GAIN: f64 = 1e-4;
 
 // Numbers that say no more beyond a point are held there; what is no number is as far out as can be.
 fn held(value: f64, least: f64, most: f64) -> f64 {
@@ -49,30 +48,40 @@ fn logarithm(value: f64, least: f64) -> f64 {
     held(value, least, MOST).ln()
 }
 
-/// What the feature vector of an effect is, in the order of [`EFFECT_FEATURES`]. `most`: the largest ln evidence of those that were compared.
+/// By how much more ln evidence an effect gains than the best of those that do something else, or than none, as a share of what it gains.
+fn lead(findings: &Findings, compared: &[Findings]) -> f64 {
+    let kind = |found: &Findings| found.effect.parse::<EffectKind>().ok();
+    let same = |other: &Findings| {
+        other.effect == findings.effect
+            || kind(other).zip(kind(findings)).is_some_and(|(other, own)| are_twins([other, own]))
+    };
+    let others = compared.iter().filter(|other| !same(other)).map(|other| other.log_evidence);
+    (findings.log_evidence - others.fold(0.0, f64::max)) / findings.log_evidence.max(1.0)
+}
+
+/// What the feature vector of an effect is, in the order of [`EFFECT_FEATURES`]. `compared`: all that were.
 #[must_use]
-pub fn effect_features(findings: &Findings, most: f64) -> [f64; EFFECT_FEATURES.len()] {
-    let gain = |value: f64| held(value, 0.0, MOST).ln_1p();
+pub fn effect_features(findings: &Findings, compared: &[Findings]) -> [f64; EFFECT_FEATURES.len()] {
     let bounded = |value: f64, most: f64| held(value, -most, most);
-    // Where no more than noise is left evidence means what it says.
-    let explained = held(findings.after, 1.0, MOST).recip();
+    let signed = |value: f64| bounded(value, MOST).abs().ln_1p().copysign(value);
+    let [without, with] = findings.motion_share.map(|share| logarithm(share, 1e-3));
+    // Where no more than noise is left of the motion, evidence means what it says.
+    let explained = held(findings.motion_after, 1.0, MOST).recip();
+    let lead = bounded(lead(findings, compared), 1.0);
+    let force_gain = signed(findings.force_gain);
     [
-        gain(findings.log_evidence),
-        gain(most - findings.log_evidence),
-        bounded(findings.steadiness, 6.0),
-        bounded(findings.heldout_steadiness, 6.0),
-        bounded(findings.drop, 3.0),
-        logarithm(findings.before, 0.5),
+        lead,
+        explained * lead,
+        bounded(findings.drop_steadiness, 8.0),
+        bounded(findings.slow_drop, 3.0),
+        logarithm(findings.gain.max(0.0) + LEAST_GAIN, LEAST_GAIN),
+        signed(findings.median_gain),
+        force_gain,
+        explained * force_gain,
+        bounded(without - with, 3.0),
         logarithm(findings.motion_after, 0.5),
-        logarithm(findings.force_after, 0.5),
-        logarithm(findings.motion_share[1], 1e-3),
         logarithm(findings.force_share[1], 1e-2),
-        logarithm(findings.size, 1e-2),
-        // Hardly any is far beyond its prior: what is fitted that strong stands for something else.
-        held(findings.size, 0.0, FARTHEST),
         held(findings.coordinates as f64, 0.0, 4.0),
-        explained * gain(findings.log_evidence),
-        explained * bounded(findings.steadiness, 6.0),
     ]
 }
 
@@ -166,6 +175,9 @@ pub struct Decision {
     pub none: Score,
     /// Of something else.
     pub unknown: Score,
+    /// By how much 90 % intervals of strengths are wider than those that our own engine's logs ask for: so wide, 90 % of the true values of the logs that
+    /// it was made from lie within.
+    pub width: f64,
 }
 
 /// Features with mean 0 and standard deviation 1.
@@ -191,9 +203,8 @@ impl Decision {
     #[must_use]
     pub fn probabilities(&self, findings: &[Findings]) -> Probabilities {
         let compared: Vec<&Findings> = findings.iter().filter(|found| !found.effect.is_empty()).collect();
-        let most = compared.iter().map(|found| found.log_evidence).fold(f64::NEG_INFINITY, f64::max);
         let of_effect =
-            |found: &&Findings| self.effect.of(standardised(&effect_features(found, most), &self.effect_features));
+            |found: &&Findings| self.effect.of(standardised(&effect_features(found, findings), &self.effect_features));
         let of_log = |score: &Score| score.of(standardised(&log_features(findings), &self.log_features));
         let mut scores: Vec<f64> = compared.iter().map(of_effect).collect();
         scores.extend([&self.none, &self.unknown].map(of_log));
@@ -217,24 +228,23 @@ pub(crate) mod tests {
         Findings {
             effect: effect.into(),
             log_evidence,
-            margin: 0.0,
             whole: true,
             coordinates: 2,
-            steadiness: 5.0,
-            heldout_steadiness: 4.0,
-            drop: 2.0,
+            drop_steadiness: 5.0,
+            slow_drop: 1.0,
+            gain: 0.5,
+            // So that the feature is ln(1 + ln evidence).
+            median_gain: log_evidence,
+            force_gain: 10.0,
             before: 9.0,
-            after: 1.1,
             motion_after: 1.1,
-            force_after: 1.0,
             motion_share: [0.1, 0.01],
             force_share: [0.3, 0.1],
-            size: 1.0,
             episodes: [20, 4],
         }
     }
 
-    /// A decision by ln evidence alone: the score of an effect is ln(1 + ln evidence), those of nothing and something else are these.
+    /// A decision by the median episode's gain alone: the score of an effect is ln(1 + gain), those of nothing and something else are these.
     pub(crate) fn by_evidence([none, unknown]: [f64; 2]) -> Decision {
         let plain = |names: &[&str]| names.iter().map(|name| ((*name).to_string(), 0.0, 1.0)).collect::<Vec<Scale>>();
         let offset = |offset: f64| Score { offset, weights: vec![0.0; LOG_FEATURES.len()] };
@@ -242,9 +252,13 @@ pub(crate) mod tests {
             provenance: serde_json::Value::Null,
             effect_features: plain(&EFFECT_FEATURES),
             log_features: plain(&LOG_FEATURES),
-            effect: Score { offset: 0.0, weights: [vec![1.0], vec![0.0; EFFECT_FEATURES.len() - 1]].concat() },
+            effect: Score {
+                offset: 0.0,
+                weights: EFFECT_FEATURES.map(|name| f64::from(u8::from(name == "median gain"))).to_vec(),
+            },
             none: offset(none),
             unknown: offset(unknown),
+            width: 1.0,
         }
     }
 
@@ -257,7 +271,7 @@ pub(crate) mod tests {
         assert_eq!(shipped.effect.weights.len(), EFFECT_FEATURES.len());
         assert!([&shipped.none, &shipped.unknown].iter().all(|score| score.weights.len() == LOG_FEATURES.len()));
         for size in [0.0, 1.0, 1e300, f64::INFINITY, f64::NAN] {
-            let odd = Findings { before: size, motion_after: size, steadiness: -size, ..findings("table_tilt", size) };
+            let odd = Findings { before: size, motion_after: size, gain: -size, ..findings("table_tilt", size) };
             for compared in [vec![], vec![odd.clone()], vec![odd, findings("tether", 10.0)]] {
                 let found = shipped.probabilities(&compared);
                 let sum = found.effect() + found.none + found.unknown;

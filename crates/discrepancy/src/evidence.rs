@@ -149,8 +149,7 @@ impl Evidence {
             before: thin(&pairs(&x[0], &y[0], |row| row.simulated)),
             after: thin(&pairs(&x[1], &y[1], |row| row.simulated)),
         };
-        let force = |kind: Kind| matches!(kind, Kind::WristForce | Kind::WristTorque | Kind::JointTorque);
-        let channel = worst_component(trial, before[place].as_slice(), force)
+        let channel = worst_component(trial, before[place].as_slice(), Kind::is_force)
             .or_else(|| worst_component(trial, before[place].as_slice(), |kind| kind == Kind::ObjectPosition));
         evidence.course = channel.map(|(channel, component)| {
             let [before, after] = compared(channel, component);

@@ -70,7 +70,8 @@ const NORMAL_90: f64 = 1.645;
 
 /// Moves resamples of a fit away from it, so that their spread covers what a bootstrap cannot see. Systematic errors are a share of the strengths of
 /// each effect: one standard deviation is `share`, by which the model is still off where the object goes, or what the engine is never better than.
-pub fn widen(samples: &mut [Vec<f64>], fit: &Fit, share: f64) {
+/// All of it times `width`, which is learnt from logs of other engines (see [`crate::decision::Decision::width`]).
+pub fn widen(samples: &mut [Vec<f64>], fit: &Fit, share: f64, width: f64) {
     let share = SYSTEMATIC_SHARE.max(NORMAL_90 * share);
     let model = &fit.model;
     let mut systematic = vec![0.0; fit.x.len()];
@@ -85,7 +86,7 @@ pub fn widen(samples: &mut [Vec<f64>], fit: &Fit, share: f64) {
         let [low, high] = middle_90(samples.iter().map(|sample| sample[index]).collect());
         let half = 0.5 * (high - low);
         if half > 0.0 {
-            let by = TOO_NARROW.hypot(systematic / half);
+            let by = width * TOO_NARROW.hypot(systematic / half);
             samples.iter_mut().for_each(|sample| sample[index] = x + by * (sample[index] - x));
         }
     }
@@ -164,9 +165,9 @@ mod tests {
         let (fit, _) = linear(27, 3);
         let samples = bootstrap(&fit, &each(&fit), 3).unwrap();
         let mut wide = samples.clone();
-        widen(&mut wide, &fit, 0.0);
+        widen(&mut wide, &fit, 0.0, 1.5);
         for (sample, wide) in samples.iter().zip(&wide) {
-            assert!((wide[0] - fit.x[0] - TOO_NARROW * (sample[0] - fit.x[0])).abs() < 1e-12);
+            assert!((wide[0] - fit.x[0] - 1.5 * TOO_NARROW * (sample[0] - fit.x[0])).abs() < 1e-12);
         }
     }
 

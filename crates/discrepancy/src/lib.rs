@@ -48,6 +48,7 @@ mod error;
 pub mod evidence;
 pub mod findings;
 pub mod fit;
+mod gains;
 pub mod heldout;
 pub mod interval;
 pub mod likelihood;

@@ -42,6 +42,11 @@ impl Stack {
         self.sums().map(|sums| sums.iter().map(|(chi2, count)| episode_cost(*chi2, *count)).sum()).collect()
     }
 
+    /// The cells of each episode, and χ² and number of residuals of each cell.
+    pub(crate) fn by_cell(&self) -> impl Iterator<Item = (&Cells, Vec<(f64, usize)>)> + '_ {
+        self.cells.iter().map(AsRef::as_ref).zip(self.sums())
+    }
+
     /// χ² and number of residuals of each cell, episode by episode.
     fn sums(&self) -> impl Iterator<Item = Vec<(f64, usize)>> + '_ {
         self.episodes.iter().zip(&self.cells).map(|(residuals, cells)| {

@@ -4,7 +4,7 @@ use measured_log::Log;
 use physics_model::EffectKind;
 use serde::Serialize;
 
-use crate::decision::Probabilities;
+use crate::decision::{Decision, Probabilities};
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::evidence::Evidence;
 use crate::findings::Findings;
@@ -141,6 +141,8 @@ pub struct Report {
     pub probabilities: Probabilities,
     /// What speaks for each effect that each round of the search compared: what the decision is made of.
     pub findings: Vec<Vec<Findings>>,
+    /// By how much intervals are wider than those that our own engine's logs ask for, see [`Decision::width`].
+    pub interval_width: f64,
     /// The nominal model, re-tuned.
     pub retuned: Vec<Retuned>,
     /// Held-out episodes before and after, for plots.
@@ -273,7 +275,8 @@ impl Report {
     pub fn new(diagnosis: &Diagnosis, settings: &Settings, seconds: f64) -> Self {
         let [before, after] = diagnosis.reported.errors();
         let mut samples = bootstrap(&diagnosis.model, &diagnosis.pieces, settings.seed).unwrap_or_default();
-        widen(&mut samples, &diagnosis.model, unexplained_share(diagnosis));
+        let interval_width = Decision::shipped().width;
+        widen(&mut samples, &diagnosis.model, unexplained_share(diagnosis), interval_width);
         let effects = effects(diagnosis, &samples);
         let verdict = diagnosis.verdict;
         let confusion_set = confusion_set(&diagnosis.probabilities, settings.confusion);
@@ -313,6 +316,7 @@ impl Report {
             },
             probabilities: diagnosis.probabilities.clone(),
             findings: diagnosis.findings.clone(),
+            interval_width,
             retuned: retuned(diagnosis, &samples),
             effects,
             evidence: diagnosis.evidence.clone(),

@@ -7,8 +7,8 @@ use std::process::ExitCode;
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 use diagnose_benchmark::judge::{Judged, judge, judge_withheld};
-use diagnose_benchmark::learn::{Example, learn, leave_one_engine_out, read};
-use discrepancy::decision::{Decision, Probabilities};
+use diagnose_benchmark::learn::{Example, Judgement, learn, leave_one_engine_out, read};
+use discrepancy::decision::Decision;
 use program::Failed;
 use serde::Serialize;
 use statistics::wilson95;
@@ -77,9 +77,10 @@ fn run(arguments: &Arguments) -> Result<()> {
         Some(path) => unseen(path, &all)?,
         None => leave_one_engine_out(&examples, &all),
     };
-    let (withheld, judged): (Vec<_>, Vec<_>) = judged.into_iter().partition(|(example, _)| example.withheld);
-    let of = |engine: &str| -> Vec<(&Example, Probabilities)> {
-        judged.iter().filter(|(example, _)| engine.is_empty() || example.truth.engine == engine).cloned().collect()
+    let (withheld, judged): (Vec<_>, Vec<_>) = judged.into_iter().partition(|judgement| judgement.example.withheld);
+    let of = |engine: &str| -> Vec<Judgement> {
+        let own = |judgement: &&Judgement| engine.is_empty() || judgement.example.truth.engine == engine;
+        judged.iter().filter(own).cloned().collect()
     };
     let mut rows: Vec<(String, Judged)> = engines.iter().map(|engine| (engine.clone(), judge(&of(engine)))).collect();
     rows.push(("all".into(), judge(&of(""))));
@@ -102,7 +103,7 @@ fn run(arguments: &Arguments) -> Result<()> {
 }
 
 /// Every example with the probabilities of a decision that was made from other logs.
-fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<(&'a Example, Probabilities)>> {
+fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<Judgement<'a>>> {
     let decision: Decision = diagnose_benchmark::folder::read(path)?;
     let seen = |example: &Example| {
         let sets = decision.provenance["sets"].as_array();
@@ -116,7 +117,7 @@ fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<(&'
             path.display()
         );
     }
-    Ok(examples.iter().map(|example| (example, decision.probabilities(&example.findings))).collect())
+    Ok(examples.iter().map(|example| Judgement::new(example, &decision)).collect())
 }
 
 fn write(path: &std::path::Path, text: &str) -> Result<()> {
@@ -182,6 +183,13 @@ fn markdown(table: &Table) -> String {
         let _ =
             writeln!(text, "| {mean:.2} | {count} | {} |", share((right * f64::from(*count)).round() as u32, *count));
     }
+    let [logs, named] = all.effects;
+    let _ = writeln!(
+        text,
+        "\nOf the {} effects that are not named, in {} logs one is named that does nearly the same, such as a force for a tilt.",
+        logs - named,
+        all.twins
+    );
     let [logs, unknown, named, sure] = table.withheld;
     let _ = writeln!(
         text,

@@ -113,6 +113,7 @@ fn report(verdict: Verdict) -> Report {
             episodes: vec![(3, 12.0, 1.1), (7, 4.0, 0.9)],
             plain: Vec::new(),
         },
+        interval_width: 1.0,
         retuned: vec![Retuned {
             key: "object.mass_kg".into(),
             prior: [0.5, 0.05],

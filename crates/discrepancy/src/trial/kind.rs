@@ -41,6 +41,12 @@ impl Kind {
         Self::JointTorque,
     ];
 
+    /// Whether it is a force or a torque.
+    #[must_use]
+    pub fn is_force(self) -> bool {
+        matches!(self, Self::WristForce | Self::WristTorque | Self::JointTorque)
+    }
+
     /// Name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
