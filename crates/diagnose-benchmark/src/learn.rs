@@ -246,7 +246,7 @@ pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
     Ok(examples)
 }
 
-/// Reads a folder of `diagnose-benchmark`, which holds its answers: logs of our own engine with other settings.
+/// Reads a folder of `diagnose-benchmark`, which holds its answers: logs of our own engine with other settings, but for those that hide something else.
 fn read_own(folder: &Path) -> Result<Vec<Example>> {
     let identity: Identity = crate::folder::read(&folder.join("plan.json"))?;
     let plan = Plan::new(identity.options.clone());
@@ -258,6 +258,10 @@ fn read_own(folder: &Path) -> Result<Vec<Example>> {
             continue;
         }
         let own: plan::Truth = crate::folder::read(&truth)?;
+        // Our benchmark has more of what the catalogue lacks than the logs of other engines: taught by it, `none` would be called `unknown`.
+        if own.spec.unknown.is_some() {
+            continue;
+        }
         let named = |effect: &EffectConfig| Named {
             name: effect.kind().name().into(),
             parameters: (effect.kind().parameters().iter().zip(effect.values()))

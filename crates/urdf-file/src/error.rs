@@ -16,7 +16,7 @@ pub enum UrdfError {
         source: std::io::Error,
     },
     /// The file is not URDF.
-    #[error("{}: cannot be parsed, expected URDF: {reason}", .path.display())]
+    #[error("{}: cannot be parsed: {reason}", .path.display())]
     Parse {
         /// File.
         path: PathBuf,

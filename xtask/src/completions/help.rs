@@ -65,15 +65,23 @@ pub(crate) fn parse(text: &str) -> Help {
     if !first.starts_with("Usage:") {
         help.about = first.split_whitespace().collect::<Vec<_>>().join(" ");
     }
-    let mut section = "";
+    let (mut section, mut examples) = ("", 0);
     for line in text.lines() {
         let (indent, entry) = (line.len() - line.trim_start().len(), line.trim());
         if entry.is_empty() {
             continue;
         }
+        // What follows two spaces is a remark.
+        let without_remark = entry.split("  ").next().unwrap_or_default().trim();
         if entry.starts_with("cargo xtask ") && section != "Options:" {
-            // What follows two spaces is a remark.
-            help.example.get_or_insert(entry.split("  ").next().unwrap_or_default().trim().into());
+            help.example.get_or_insert(without_remark.into());
+            examples += 1;
+        } else if let (Some(example), 1) = (&mut help.example, examples)
+            && indent > 0
+            && section.starts_with("Example")
+        {
+            // Long ones go on in the next line.
+            more(example, without_remark);
         }
         if indent == 0 {
             section = entry;
@@ -180,14 +188,17 @@ Options:
           Print help
 
 Examples:
-  cargo xtask scenario check D4
+  cargo xtask scenario check D4 --robot sawyer --out
+  runs/checked  # a remark
+  cargo xtask scenario check D5 --robot
+  jaco
 ";
 
     #[test]
     fn the_long_help_says_the_same_and_an_example() {
         let help = parse(LONG);
         assert_eq!(help.about, "Checks a file.");
-        assert_eq!(help.example.as_deref(), Some("cargo xtask scenario check D4"));
+        assert_eq!(help.example.as_deref(), Some("cargo xtask scenario check D4 --robot sawyer --out runs/checked"));
         assert_eq!(help.arguments, [("<FILE>".to_owned(), "What to check.".to_owned())]);
         let usages: Vec<_> = help.usages().collect();
         let about = "Who plays. As in cargo xtask eval. Values: local, slurm.";

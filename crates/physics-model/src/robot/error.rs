@@ -46,7 +46,7 @@ pub enum RobotError {
         source: std::io::Error,
     },
     /// The file is not URDF.
-    #[error("robot.urdf = {}: cannot be parsed, expected URDF: {reason}", .path.display())]
+    #[error("robot.urdf = {}: cannot be parsed: {reason}", .path.display())]
     Parse {
         /// File.
         path: PathBuf,
