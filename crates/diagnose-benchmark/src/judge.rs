@@ -5,7 +5,8 @@ use discrepancy::decision::Probabilities;
 use physics_model::EffectKind;
 use serde::Serialize;
 
-use crate::learn::{Judgement, Kind, Truth};
+use crate::example::{Kind, Truth};
+use crate::learn::Judgement;
 
 /// Edges of the bins of that mean square in which names are counted. Two good engines without an effect differ by tens to hundreds (`tests/peers/worlds/gap.py`).
 const EDGES: [f64; 2] = [30.0, 300.0];

@@ -23,6 +23,7 @@
 pub mod actions;
 pub mod choice;
 pub mod draw;
+pub mod example;
 pub mod folder;
 pub mod gaussian_process;
 pub mod generate;

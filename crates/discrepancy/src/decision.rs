@@ -16,9 +16,10 @@ use crate::findings::Findings;
 use crate::report::Verdict;
 
 /// Names of the features of an effect, in order.
-pub const EFFECT_FEATURES: [&str; 12] = [
+pub const EFFECT_FEATURES: [&str; 13] = [
     "lead",
     "lead, explained",
+    "lead over twins",
     "drop steadiness",
     "slow drop",
     "ln gain",
@@ -48,15 +49,18 @@ fn logarithm(value: f64, least: f64) -> f64 {
     held(value, least, MOST).ln()
 }
 
-/// By how much more ln evidence an effect gains than the best of those that do something else, or than none, as a share of what it gains.
-fn lead(findings: &Findings, compared: &[Findings]) -> f64 {
+/// By how much more ln evidence an effect gains than the best of those that do something else, or than none, as a share of what it gains; and by how many
+/// nats more than the best of those that do nearly the same, 0 where none was compared.
+fn leads(findings: &Findings, compared: &[Findings]) -> [f64; 2] {
     let kind = |found: &Findings| found.effect.parse::<EffectKind>().ok();
-    let same = |other: &Findings| {
-        other.effect == findings.effect
-            || kind(other).zip(kind(findings)).is_some_and(|(other, own)| are_twins([other, own]))
-    };
-    let others = compared.iter().filter(|other| !same(other)).map(|other| other.log_evidence);
-    (findings.log_evidence - others.fold(0.0, f64::max)) / findings.log_evidence.max(1.0)
+    let is_twin =
+        |other: &Findings| kind(other).zip(kind(findings)).is_some_and(|(other, own)| are_twins([other, own]));
+    let others = compared.iter().filter(|other| other.effect != findings.effect);
+    let (twins, others): (Vec<&Findings>, Vec<&Findings>) = others.partition(|other| is_twin(other));
+    let evidence = |all: &[&Findings], least| all.iter().map(|other| other.log_evidence).fold(least, f64::max);
+    let own = findings.log_evidence;
+    let over_twins = if twins.is_empty() { 0.0 } else { own - evidence(&twins, f64::NEG_INFINITY) };
+    [(own - evidence(&others, 0.0)) / own.max(1.0), over_twins]
 }
 
 /// What the feature vector of an effect is, in the order of [`EFFECT_FEATURES`]. `compared`: all that were.
@@ -67,11 +71,13 @@ pub fn effect_features(findings: &Findings, compared: &[Findings]) -> [f64; EFFE
     let [without, with] = findings.motion_share.map(|share| logarithm(share, 1e-3));
     // Where no more than noise is left of the motion, evidence means what it says.
     let explained = held(findings.motion_after, 1.0, MOST).recip();
-    let lead = bounded(lead(findings, compared), 1.0);
+    let [lead, over_twins] = leads(findings, compared);
+    let lead = bounded(lead, 1.0);
     let force_gain = signed(findings.force_gain);
     [
         lead,
         explained * lead,
+        signed(over_twins),
         bounded(findings.drop_steadiness, 8.0),
         bounded(findings.slow_drop, 3.0),
         logarithm(findings.gain.max(0.0) + LEAST_GAIN, LEAST_GAIN),
@@ -292,6 +298,16 @@ pub(crate) mod tests {
         // Nothing that was compared is no effect.
         let nothing = decision.probabilities(&[findings("", 0.0)]);
         assert!(nothing.effects.is_empty() && nothing.verdict() == Verdict::None && nothing.best() == ("", 0.0));
+    }
+
+    #[test]
+    fn twins_are_told_apart_by_their_evidence_and_compete_with_others_together() {
+        let all = [findings("table_tilt", 80.0), findings("constant_force", 50.0), findings("adhesion", 20.0)];
+        let of = |place: usize| leads(&all[place], &all);
+        assert_eq!((of(0), of(1)), ([0.75, 30.0], [0.6, -30.0]));
+        // One without a twin is behind the best of the others.
+        assert_eq!(of(2), [-3.0, 0.0]);
+        assert_eq!(leads(&all[0], &all[..1]), [1.0, 0.0]);
     }
 
     #[test]

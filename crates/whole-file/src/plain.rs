@@ -51,7 +51,7 @@ const FOUND: [(&str, &str); 13] = [
 ];
 
 /// Sentences of decoders of JSON, TOML, XML and numbers that say nothing to who writes a file.
-const SENTENCES: [(&str, &str); 27] = [
+const SENTENCES: [(&str, &str); 29] = [
     // A name where a table was: what is there, the decoder does not say.
     ("invalid type: unit variant, expected string only", "expected a name, or a table with one key"),
     ("wanted exactly 1 element, found 0 elements", "expected a table with one key, found an empty one"),
@@ -78,6 +78,8 @@ const SENTENCES: [(&str, &str); 27] = [
     ("invalid float literal", "expected a number"),
     ("cannot parse float from empty string", "expected a number, found nothing"),
     ("number too large to fit in target type", "expected a smaller whole number"),
+    ("u64 value was too large", "expected a smaller whole number"),
+    ("i64 value was too large", "expected a smaller whole number"),
     ("number too small to fit in target type", "expected a larger whole number"),
     ("provided string was not `true` or `false`", "expected true or false"),
 ];
@@ -204,8 +206,10 @@ fn expectation(expected: &str) -> String {
 
 fn finding(found: &str) -> String {
     let known = FOUND.iter().find_map(|(start, words)| Some((found.strip_prefix(start)?, words)));
-    // `true`, `5` and `1.5` stand between backticks.
-    known.map_or_else(|| found.to_string(), |(rest, words)| format!("{words}{}", rest.trim_matches('`')))
+    // `true`, `5` and `1.5` stand between backticks, what is too large for 64 bits with its type.
+    let bare =
+        |rest: &str| rest.trim_end_matches(" as i128").trim_end_matches(" as u128").trim_matches('`').to_string();
+    known.map_or_else(|| found.to_string(), |(rest, words)| format!("{words}{}", bare(rest)))
 }
 
 #[cfg(test)]
@@ -222,6 +226,11 @@ mod tests {
             ("invalid type: floating point `1.5`, expected u32", "expected a whole number, 0 or more, found 1.5"),
             ("invalid value: integer `-1`, expected u64", "expected a whole number, 0 or more, found -1"),
             ("invalid type: boolean `true`, expected f64", "expected a number, found true"),
+            (
+                "invalid type: integer `99999999999999999999` as i128, expected u64",
+                "expected a whole number, 0 or more, found 99999999999999999999",
+            ),
+            ("u64 value was too large", "expected a smaller whole number"),
             ("invalid type: integer `3`, expected struct Header", "expected a table, found 3"),
             ("invalid type: map, expected a sequence", "expected a list, found a table"),
             ("invalid type: sequence, expected a string", "expected a text, found a list"),

@@ -6,8 +6,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
+use diagnose_benchmark::example::{Example, read};
 use diagnose_benchmark::judge::{Judged, judge, judge_withheld};
-use diagnose_benchmark::learn::{Example, Judgement, learn, leave_one_engine_out, read};
+use diagnose_benchmark::learn::{Judgement, learn, leave_one_engine_out};
 use discrepancy::decision::Decision;
 use program::Failed;
 use serde::Serialize;

@@ -1,0 +1,380 @@
+//! A log with its answer, and what it teaches.
+//!
+//! Logs of other engines: a folder holds `log-NNN/` and `truth/log-NNN.json`, as `tests/peers/worlds/make_logs.py` writes them; answers lie in
+//! `ANSWERS/FOLDER/log-NNN/report.json`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context as _, Result};
+use discrepancy::decision::Probabilities;
+use discrepancy::{are_twins, findings::Findings};
+use physics_model::{EffectConfig, EffectKind};
+use serde::{Deserialize, Serialize};
+
+use crate::folder::{Identity, name};
+use crate::generate::Actions;
+use crate::plan::{self, Plan};
+
+/// A mean square difference, in those of noise, by which an effect changes its episodes, below which nothing shows.
+const DETECTABLE: f64 = 3.0;
+/// Episodes of a log of our own benchmark, about.
+const OWN_EPISODES: usize = 40;
+/// A camera's delay, s, up to which it is a skew of its clock.
+const SKEW_SECS: f64 = 0.05;
+
+/// What a log hides.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Truth {
+    /// Engine that made it.
+    pub engine: String,
+    /// Its contacts.
+    pub variant: String,
+    /// Seed.
+    pub seed: u64,
+    /// Effects of the catalogue.
+    pub effects: Vec<Named>,
+    /// Effects that the catalogue has not.
+    pub outside: Vec<serde_json::Value>,
+    /// Mean square of what all of these change, in that of noise.
+    pub detectable: Option<f64>,
+    /// Effects that its engine has by nature, such as the anisotropy of a pyramidal friction cone: neither right nor wrong.
+    #[serde(default)]
+    pub natural: Vec<String>,
+    /// Whether its actions were chosen to tell effects apart.
+    pub designed: bool,
+    /// Number of its episodes.
+    pub episodes: usize,
+}
+
+/// A hidden effect.
+#[derive(Clone, Debug, Deserialize)]
+pub struct Named {
+    /// Name.
+    pub name: String,
+    /// Values by the keys of its parameters.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, serde_json::Value>,
+}
+
+impl Named {
+    /// Whether it is re-tuned like a mass, and no diagnosis names it.
+    fn is_re_tuned(&self) -> bool {
+        let delay_secs = || self.parameters.get("delay_secs").and_then(serde_json::Value::as_f64);
+        match self.name.as_str() {
+            "contact_compliance" => true,
+            "pose_delay" => delay_secs().is_some_and(|secs| secs <= SKEW_SECS),
+            _ => false,
+        }
+    }
+}
+
+/// What a right answer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// An effect of the catalogue.
+    Effect,
+    /// Nothing.
+    None,
+    /// Something that the catalogue has not.
+    Outside,
+}
+
+impl Truth {
+    /// What a right answer is. An effect that changes less than noise is none, and so is what is re-tuned.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        let shows = self.detectable.is_some_and(|size| size >= DETECTABLE);
+        match (self.effects.iter().all(Named::is_re_tuned), self.outside.is_empty()) {
+            (_, false) if shows => Kind::Outside,
+            (false, true) if shows => Kind::Effect,
+            _ => Kind::None,
+        }
+    }
+
+    /// Whether a name is one of what is hidden.
+    #[must_use]
+    pub fn names(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name)
+    }
+}
+
+/// What of an answer is read.
+#[derive(Clone, Debug, Deserialize)]
+struct Answer {
+    findings: Vec<Vec<Findings>>,
+    effects: Vec<Answered>,
+    /// By how much its intervals were widened.
+    #[serde(default = "plain_width")]
+    interval_width: f64,
+    rollouts: u64,
+    seconds: f64,
+}
+
+fn plain_width() -> f64 {
+    1.0
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Answered {
+    name: String,
+    parameters: Vec<Value>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Value {
+    key: String,
+    value: f64,
+    /// JSON has no infinity: an end that is none is one.
+    interval90: [Option<f64>; 2],
+}
+
+impl Value {
+    /// How far `truth` is away from the value, as a share of how far the interval reaches to that side.
+    fn off(&self, truth: f64) -> f64 {
+        let [low, high] = self.interval90;
+        let end = if truth > self.value { high } else { low };
+        match (truth - self.value, end.map(|end| end - self.value)) {
+            (0.0, _) | (_, None) => 0.0,
+            (away, Some(reach)) => (away.abs() / reach.abs()).min(f64::INFINITY),
+        }
+    }
+}
+
+/// A log with its answer.
+#[derive(Clone, Debug)]
+pub struct Example {
+    /// Folder and name.
+    pub log: String,
+    /// What it hides.
+    pub truth: Truth,
+    /// What speaks for each effect that was compared, but for those that the engine has by nature.
+    pub findings: Vec<Findings>,
+    /// Of each parameter of a rightly named effect, how far its true value is away, as a share of how far an interval of width 1 reaches to that side.
+    pub off: Vec<f64>,
+    /// Simulated episodes.
+    pub rollouts: u64,
+    /// Duration, s.
+    pub seconds: f64,
+    /// Whether what it hides was withheld from what was compared.
+    pub withheld: bool,
+}
+
+impl Example {
+    /// The same log as if the catalogue had neither what it hides nor what does nearly the same: something else is missing. `None` where the search did not
+    /// compare it, or nothing else.
+    #[must_use]
+    pub fn without_truth(&self) -> Option<Self> {
+        if self.truth.kind() != Kind::Effect || self.label() >= self.findings.len() {
+            return None;
+        }
+        let kind = |name: &str| name.parse::<EffectKind>().ok();
+        let same = |found: &Findings, hidden: &Named| {
+            found.effect == hidden.name
+                || kind(&found.effect).zip(kind(&hidden.name)).is_some_and(|(a, b)| are_twins([a, b]))
+        };
+        let mut other = Self { withheld: true, ..self.clone() };
+        let hidden = std::mem::take(&mut other.truth.effects);
+        other.findings.retain(|found| !hidden.iter().any(|hidden| same(found, hidden)));
+        other.truth.outside = hidden.into_iter().map(|hidden| hidden.name.into()).collect();
+        (!other.findings.is_empty()).then_some(other)
+    }
+
+    /// The alternative that it teaches: the place of the effect that is right among those that were compared; then nothing, then something else.
+    pub(crate) fn label(&self) -> usize {
+        let compared = self.findings.len();
+        match self.truth.kind() {
+            Kind::None => compared,
+            Kind::Outside => compared + 1,
+            Kind::Effect => {
+                let right = self.findings.iter().position(|found| self.truth.names(&found.effect));
+                right.unwrap_or(compared + 1)
+            }
+        }
+    }
+
+    /// The probability of what it teaches.
+    pub(crate) fn of_label(&self, found: &Probabilities) -> f64 {
+        let label = self.label();
+        match self.findings.get(label) {
+            Some(right) => found.of(&right.effect),
+            None if label == self.findings.len() => found.none,
+            None => found.unknown,
+        }
+    }
+}
+
+/// Reads the logs of `folder` that have an answer in `answers`.
+///
+/// # Errors
+///
+/// Where a file cannot be read.
+pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
+    if folder.join("plan.json").exists() {
+        return read_own(folder);
+    }
+    let folder_name = folder.file_name().context("expected the name of a folder of logs")?;
+    let truths = folder.join("truth");
+    let listed = std::fs::read_dir(&truths).with_context(|| format!("cannot read {}", truths.display()))?;
+    let mut paths: Vec<_> = listed.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
+    paths.sort();
+    let mut examples = Vec::new();
+    for path in paths {
+        let Some(log) = path.file_stem() else { continue };
+        let report = answers.join(folder_name).join(log).join("report.json");
+        if !report.exists() {
+            continue;
+        }
+        let log = format!("{}/{}", folder_name.display(), log.display());
+        examples.extend(example(log, crate::folder::read(&path)?, crate::folder::read(&report)?));
+    }
+    Ok(examples)
+}
+
+/// Reads a folder of `diagnose-benchmark`, which holds its answers: logs of our own engine with other settings, but for those that hide something else.
+fn read_own(folder: &Path) -> Result<Vec<Example>> {
+    let identity: Identity = crate::folder::read(&folder.join("plan.json"))?;
+    let plan = Plan::new(identity.options.clone());
+    let mut examples = Vec::new();
+    for set in 0..plan.len() {
+        let [truth, report] = ["truth", "answers"].map(|part| folder.join(part).join(name(set)));
+        let (truth, report) = (truth.with_extension("json"), report.join("report.json"));
+        if !truth.exists() || !report.exists() {
+            continue;
+        }
+        let own: plan::Truth = crate::folder::read(&truth)?;
+        // Our benchmark has more of what the catalogue lacks than the logs of other engines: taught by it, `none` would be called `unknown`.
+        if own.spec.unknown.is_some() {
+            continue;
+        }
+        let named = |effect: &EffectConfig| Named {
+            name: effect.kind().name().into(),
+            parameters: (effect.kind().parameters().iter().zip(effect.values()))
+                .map(|(parameter, value)| (parameter.name.to_string(), value.into()))
+                .collect(),
+        };
+        let truth = Truth {
+            engine: "rapier".into(),
+            variant: "other settings".into(),
+            seed: identity.options.seed,
+            effects: own.spec.effects.iter().map(named).collect(),
+            outside: own.spec.unknown.iter().map(|unknown| serde_json::Value::from(unknown.name())).collect(),
+            // They begin where they show.
+            detectable: Some(f64::INFINITY),
+            natural: Vec::new(),
+            designed: own.spec.actions == Actions::Designed,
+            episodes: OWN_EPISODES,
+        };
+        examples.extend(example(format!("rapier/{}", name(set)), truth, crate::folder::read(&report)?));
+    }
+    Ok(examples)
+}
+
+/// Nothing of a log whose engine could not say what is hidden changes.
+fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
+    let hides = !truth.effects.is_empty() || !truth.outside.is_empty();
+    if hides && truth.detectable.is_none() {
+        return None;
+    }
+    let mut findings = answer.findings.into_iter().next()?;
+    findings.retain(|found| {
+        let natural = truth.natural.contains(&found.effect) && !truth.names(&found.effect);
+        !found.effect.is_empty() && !natural
+    });
+    let off = (answer.effects.iter())
+        .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
+        .flat_map(|(named, effect)| {
+            let off = |value: &Value| {
+                effect.parameters.get(&value.key)?.as_f64().map(|truth| value.off(truth) * answer.interval_width)
+            };
+            named.parameters.iter().filter_map(off).collect::<Vec<_>>()
+        })
+        .collect();
+    Some(Example { log, truth, findings, off, rollouts: answer.rollouts, seconds: answer.seconds, withheld: false })
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn example(engine: &str, effect: bool, found: &str, log_evidence: f64) -> Example {
+        let effects =
+            if effect { vec![Named { name: "table_tilt".into(), parameters: BTreeMap::new() }] } else { Vec::new() };
+        let truth = Truth {
+            engine: engine.into(),
+            variant: "default".into(),
+            seed: 1,
+            effects,
+            outside: Vec::new(),
+            detectable: Some(if effect { 10.0 } else { 0.0 }),
+            natural: Vec::new(),
+            designed: true,
+            episodes: 30,
+        };
+        let findings = vec![Findings {
+            effect: found.into(),
+            log_evidence,
+            whole: true,
+            coordinates: 2,
+            drop_steadiness: 1.0,
+            slow_drop: 0.0,
+            gain: 0.0,
+            median_gain: log_evidence,
+            force_gain: 0.0,
+            before: 2.0,
+            motion_after: 2.0,
+            motion_share: [0.1; 2],
+            force_share: [0.0; 2],
+            episodes: [20, 4],
+        }];
+        Example { log: "log".into(), truth, findings, off: vec![0.5], rollouts: 100, seconds: 1.0, withheld: false }
+    }
+
+    #[test]
+    fn a_log_without_its_effect_in_the_catalogue_misses_something_else() {
+        let mut log = example("a", true, "table_tilt", 100.0);
+        // Nothing else was compared.
+        assert!(log.without_truth().is_none());
+        for other in ["constant_force", "viscous_damping"] {
+            let found = Findings { effect: other.into(), ..log.findings[0].clone() };
+            log.findings.push(found);
+        }
+        let without = log.without_truth().unwrap();
+        let left: Vec<&str> = without.findings.iter().map(|found| found.effect.as_str()).collect();
+        // A constant force does what a tilt does.
+        assert_eq!((left, without.truth.kind(), without.label()), (vec!["viscous_damping"], Kind::Outside, 2));
+        assert!(without.withheld && without.without_truth().is_none());
+    }
+
+    #[test]
+    fn an_effect_that_does_not_show_or_is_re_tuned_is_none() {
+        let mut hidden = example("a", true, "table_tilt", 10.0).truth;
+        assert_eq!(hidden.kind(), Kind::Effect);
+        hidden.detectable = Some(0.5);
+        assert_eq!(hidden.kind(), Kind::None);
+        hidden = Truth {
+            detectable: Some(50.0),
+            effects: vec![Named { name: "contact_compliance".into(), parameters: BTreeMap::new() }],
+            ..hidden
+        };
+        assert_eq!(hidden.kind(), Kind::None);
+        for (secs, kind) in [(0.03, Kind::None), (0.08, Kind::Effect)] {
+            let parameters = [("delay_secs".to_string(), serde_json::Value::from(secs))].into();
+            hidden.effects = vec![Named { name: "pose_delay".into(), parameters }];
+            assert_eq!(hidden.kind(), kind);
+        }
+        hidden.effects.clear();
+        hidden.outside.push(serde_json::Value::from("magnet"));
+        assert_eq!(hidden.kind(), Kind::Outside);
+    }
+
+    #[test]
+    fn how_far_a_value_is_off_is_counted_in_the_reach_of_its_interval() {
+        let value = |interval90| Value { key: "slope_x_rad".into(), value: 1.0, interval90 };
+        assert_eq!([0.5, 1.0, 2.0].map(|truth| value([Some(0.0), Some(1.5)]).off(truth)), [0.5, 0.0, 2.0]);
+        // An end that is none holds everything; an interval that ends at its value nothing beyond.
+        assert_eq!([value([None, Some(2.0)]).off(-9.0), value([Some(1.0), Some(2.0)]).off(0.5)], [0.0, f64::INFINITY]);
+    }
+}
