@@ -8,8 +8,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result};
 use discrepancy::decision::Probabilities;
-use discrepancy::{are_twins, findings::Findings};
-use physics_model::{EffectConfig, EffectKind};
+use discrepancy::{are_twins_by_name, findings::Findings};
+use physics_model::EffectConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::folder::{Identity, name};
@@ -106,14 +106,9 @@ struct Answer {
     findings: Vec<Vec<Findings>>,
     effects: Vec<Answered>,
     /// By how much its intervals were widened.
-    #[serde(default = "plain_width")]
     interval_width: f64,
     rollouts: u64,
     seconds: f64,
-}
-
-fn plain_width() -> f64 {
-    1.0
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -169,10 +164,8 @@ impl Example {
         if self.truth.kind() != Kind::Effect || self.label() >= self.findings.len() {
             return None;
         }
-        let kind = |name: &str| name.parse::<EffectKind>().ok();
         let same = |found: &Findings, hidden: &Named| {
-            found.effect == hidden.name
-                || kind(&found.effect).zip(kind(&hidden.name)).is_some_and(|(a, b)| are_twins([a, b]))
+            found.effect == hidden.name || are_twins_by_name([&found.effect, &hidden.name])
         };
         let mut other = Self { withheld: true, ..self.clone() };
         let hidden = std::mem::take(&mut other.truth.effects);

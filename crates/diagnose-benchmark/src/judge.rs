@@ -1,8 +1,7 @@
 //! How often decisions are right, on logs whose truth is known.
 
-use discrepancy::are_twins;
+use discrepancy::are_twins_by_name;
 use discrepancy::decision::Probabilities;
-use physics_model::EffectKind;
 use serde::Serialize;
 
 use crate::example::{Kind, Truth};
@@ -69,9 +68,7 @@ pub fn judge_withheld(judged: &[Judgement]) -> [u32; 4] {
 
 /// Whether an effect does nearly the same as one of what is hidden.
 fn names_twin(truth: &Truth, name: &str) -> bool {
-    let kind = |name: &str| name.parse::<EffectKind>().ok();
-    let twin = |hidden: &str| kind(hidden).zip(kind(name)).is_some_and(|(hidden, named)| are_twins([hidden, named]));
-    truth.effects.iter().any(|hidden| twin(&hidden.name))
+    truth.effects.iter().any(|hidden| are_twins_by_name([&hidden.name, name]))
 }
 
 /// Counts over judged examples.

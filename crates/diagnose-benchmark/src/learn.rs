@@ -15,8 +15,6 @@ use crate::example::{Example, Kind};
 
 /// Prior variances of a weight of a standardised feature, of which the one is taken that predicts engines best that were left out.
 const VARIANCES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
-/// No interval says anything that is wider than this many times what our own engine's logs ask for.
-const WIDEST: f64 = 100.0;
 /// That of an offset: hardly any prior.
 const OFFSET: f64 = 100.0;
 
@@ -38,6 +36,8 @@ pub fn learn(examples: &[&Example], provenance: serde_json::Value) -> Decision {
 
 /// Share of the true values that an interval is to hold.
 const HELD: f64 = 0.9;
+/// No interval says anything that is wider than this many times what our own engine's logs ask for.
+const WIDEST: f64 = 100.0;
 
 /// The width at which intervals hold that share of the true values of a further log like these (split conformal prediction: Vovk et al., "Algorithmic
 /// Learning in a Random World", 2005); 1 where nothing is known.

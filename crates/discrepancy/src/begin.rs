@@ -55,9 +55,15 @@ const TWINS: [[EffectKind; 2]; 9] = [
 ];
 
 /// Whether two kinds of effects do nearly the same.
-#[must_use]
-pub fn are_twins(kinds: [EffectKind; 2]) -> bool {
+pub(crate) fn are_twins(kinds: [EffectKind; 2]) -> bool {
     TWINS.iter().any(|twins| *twins == kinds || *twins == [kinds[1], kinds[0]])
+}
+
+/// The same of their names.
+#[must_use]
+pub fn are_twins_by_name(names: [&str; 2]) -> bool {
+    let [a, b] = names.map(str::parse::<EffectKind>);
+    a.is_ok_and(|a| b.is_ok_and(|b| are_twins([a, b])))
 }
 
 /// −ln posterior where the last effect of `model` does what that of `best` does, its twin, and a fit can begin.

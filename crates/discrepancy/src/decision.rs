@@ -8,10 +8,9 @@
 
 use std::sync::OnceLock;
 
-use physics_model::EffectKind;
 use serde::{Deserialize, Serialize};
 
-use crate::begin::are_twins;
+use crate::begin::are_twins_by_name;
 use crate::findings::Findings;
 use crate::report::Verdict;
 
@@ -52,9 +51,7 @@ fn logarithm(value: f64, least: f64) -> f64 {
 /// By how much more ln evidence an effect gains than the best of those that do something else, or than none, as a share of what it gains; and by how many
 /// nats more than the best of those that do nearly the same, 0 where none was compared.
 fn leads(findings: &Findings, compared: &[Findings]) -> [f64; 2] {
-    let kind = |found: &Findings| found.effect.parse::<EffectKind>().ok();
-    let is_twin =
-        |other: &Findings| kind(other).zip(kind(findings)).is_some_and(|(other, own)| are_twins([other, own]));
+    let is_twin = |other: &Findings| are_twins_by_name([&other.effect, &findings.effect]);
     let others = compared.iter().filter(|other| other.effect != findings.effect);
     let (twins, others): (Vec<&Findings>, Vec<&Findings>) = others.partition(|other| is_twin(other));
     let evidence = |all: &[&Findings], least| all.iter().map(|other| other.log_evidence).fold(least, f64::max);

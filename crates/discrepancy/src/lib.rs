@@ -92,7 +92,7 @@ use physics_model::rig::RigTool;
 use physics_model::robot::{Robot as Arm, RobotConfig, find_root};
 
 pub use answer::Answer;
-pub use begin::are_twins;
+pub use begin::are_twins_by_name;
 pub use diagnosis::{Diagnosis, Settings, diagnose, diagnose_watched};
 pub use error::Error;
 pub use model_file::ModelFile;
