@@ -100,9 +100,10 @@ fn every_option_in_the_documents_exists() {
 /// Verbs that a verb has of its own.
 fn verbs_of(verb: &str) -> &'static [&'static str] {
     match verb {
-        "bench" => &["physics", "calibration", "nudge", "planner", "prior", "accuracy", "log-check"],
+        "bench" => &["physics", "calibration", "nudge", "policy", "planner", "prior", "accuracy", "log-check"],
         "import-log" => &["table", "mcap", "ros2", "lerobot", "contactnets", "cmu-push"],
-        "log" => &["check"],
+        "log" => &["check", "align"],
+        "robot" => &["check"],
         "scenario" => &["check", "schema"],
         _ => &[],
     }
@@ -115,7 +116,7 @@ fn one_help(verb: &str, own: Option<&str>) -> String {
 }
 
 /// What the menu lists, without what this machine need not have.
-const VERBS: [&str; 17] = [
+const VERBS: [&str; 20] = [
     "doctor",
     "eval",
     "demo",
@@ -125,12 +126,15 @@ const VERBS: [&str; 17] = [
     "record-log",
     "log",
     "diagnose",
+    "robot",
     "datagen",
+    "posterior-data",
     "train",
     "calibrate",
     "bench",
     "diagnose-benchmark",
     "diagnose-learn",
+    "arm-learn",
     "completions",
     "docs",
 ];
@@ -138,8 +142,10 @@ const VERBS: [&str; 17] = [
 /// Commands under the last heading of a help.
 fn examples(help: &str) -> Vec<String> {
     let (_, examples) = help.rsplit_once("\nExamples:\n").unwrap_or_default();
-    let commands = examples.lines().filter_map(|line| line.trim().strip_prefix("cargo xtask "));
-    commands.map(|command| command.split("  ").next().unwrap_or(command).to_owned()).collect()
+    // Long ones go on in the next line.
+    let whole = examples.lines().map(str::trim).collect::<Vec<_>>().join(" ");
+    let commands = whole.split("cargo xtask ").skip(1);
+    commands.map(|command| command.split(" #").next().unwrap_or(command).trim().to_owned()).collect()
 }
 
 #[test]
@@ -182,7 +188,19 @@ fn every_help_ends_with_examples_whose_options_exist() {
 
 #[test]
 fn examples_that_take_seconds_work() {
-    let verbs = ["doctor", "completions", "scenario", "eval", "demo", "report", "record-log", "diagnose"];
+    let verbs = [
+        "doctor",
+        "completions",
+        "scenario",
+        "eval",
+        "demo",
+        "report",
+        "record-log",
+        "diagnose",
+        "import-log",
+        "log",
+        "robot",
+    ];
     let mut commands = Vec::new();
     for verb in verbs {
         for own in std::iter::once(None).chain(verbs_of(verb).iter().copied().map(Some)) {
@@ -239,6 +257,11 @@ fn copy_of_the_project() -> tempfile::TempDir {
     }
     let arm = std::fs::read_to_string(root().join("scenarios/robots/jaco.toml")).unwrap();
     std::fs::write(folder.path().join("my-arm.toml"), arm.replace("name = \"jaco\"", "name = \"my-arm\"")).unwrap();
+    let log = folder.path().join("runs/my-log");
+    std::fs::create_dir_all(&log).unwrap();
+    for (file, bytes) in files(&root().join("tests/data/mujoco-logs/logs/set-003")) {
+        std::fs::write(log.join(file), bytes).unwrap();
+    }
     folder
 }
 
@@ -265,8 +288,8 @@ fn play_commands(document: &str, commands: Vec<String>, but: &[&str], lacking: &
             assert!(is_synopsis(&command) || trace.is_file(), "{document}: {command}: no {}", trace.display());
         }
         let left_out = but.contains(&verb) || NOT_HERE.contains(&verb);
-        // An engine, another simulator, a robot behind a socket.
-        let absent = ["slurm", "hq", "mujoco_jaco.py", "tcp://127.0.0.1:5555"];
+        // An engine, another simulator, a robot behind a socket, data that are not shipped.
+        let absent = ["slurm", "hq", "mujoco_jaco.py", "tcp://127.0.0.1:5555", "record.txt.gz"];
         let lacks = absent.iter().chain(lacking).any(|part| command.contains(part));
         if left_out || is_synopsis(&command) || lacks {
             continue;
@@ -325,6 +348,31 @@ fn the_guide_to_an_arm_and_its_joints_works() {
 #[test]
 fn the_guide_to_your_own_effect_works() {
     play("docs/src/guides/effect.md");
+}
+
+#[test]
+fn the_guide_to_recordings_works() {
+    play("docs/src/guides/import.md");
+}
+
+#[test]
+fn the_guide_to_checking_a_log_works() {
+    play("docs/src/guides/check.md");
+}
+
+/// Guides whose commands other tests play: a scheduler of one's own (`cluster`), the answers of `diagnose` (`closing`), another workspace (`library`), and
+/// a virtual environment (`python`).
+const GUIDES_ELSEWHERE: [&str; 4] = ["cluster.md", "library.md", "python.md", "simulators.md"];
+
+#[test]
+fn every_guide_is_played() {
+    let text = include_str!("docs.rs");
+    for (guide, _) in files(&root().join("docs/src/guides")) {
+        let name = guide.to_str().unwrap();
+        let played = text.contains(&format!("play(\"docs/src/guides/{name}\")"));
+        let elsewhere = GUIDES_ELSEWHERE.contains(&name) || !name.ends_with(".md");
+        assert!(played != elsewhere, "{name}: it is played {}", if played { "twice" } else { "nowhere" });
+    }
 }
 
 #[test]

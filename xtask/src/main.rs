@@ -44,7 +44,10 @@ enum Verb {
     #[command(disable_help_flag = true)]
     Report(Rest),
     /// Makes a recording of an episode for the Rerun viewer; its first build takes long.
-    #[command(disable_help_flag = true)]
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask rerun runs/demo/D4-sawyer-surmise-mixture-seed-1-trial-0"
+    )]
     Rerun(Rest),
     /// Turns a recording or published measurements into a log that can be diagnosed.
     #[command(disable_help_flag = true)]

@@ -93,14 +93,16 @@ fn standard_gravity() -> f64 {
     9.81
 }
 
-/// Whether `log.toml` in a folder is that of a joint log: it has no object. A file that cannot be read is none.
+/// Whether `log.toml` in a folder is that of a joint log: it has no object, but a list of joints or an arm of one's own. A file that cannot be
+/// read is none.
 #[must_use]
 pub fn is_joint_log(folder: &Path) -> bool {
     let Ok(bytes) = whole_file::read(&folder.join("log.toml"), MOST_BYTES) else { return false };
     let table: Option<toml::Table> = std::str::from_utf8(&bytes).ok().and_then(|text| text.parse().ok());
     table.is_some_and(|table| {
         let named = table.get("robot").and_then(toml::Value::as_str);
-        !table.contains_key("object") && named.is_some_and(|robot| !["sawyer", "jaco", "none"].contains(&robot))
+        let own = named.is_some_and(|robot| !["sawyer", "jaco", "none"].contains(&robot));
+        !table.contains_key("object") && (own || table.contains_key("joints"))
     })
 }
 
@@ -134,10 +136,10 @@ impl Header {
             return Err(refuse(path, &format!("version = {}, expected 1", self.version)));
         }
         if !(self.period_secs > 0.0 && self.period_secs <= 1.0) {
-            return Err(refuse(path, &format!("period_secs = {}, expected a time of at most 1 s", self.period_secs)));
+            return Err(refuse(path, &format!("period_secs = {:?}, expected a time of at most 1 s", self.period_secs)));
         }
         if !(0.0..=100.0).contains(&self.gravity_mps2) {
-            return Err(refuse(path, &format!("gravity_mps2 = {}, expected 0 to 100 m/s²", self.gravity_mps2)));
+            return Err(refuse(path, &format!("gravity_mps2 = {:?}, expected 0 to 100 m/s²", self.gravity_mps2)));
         }
         Ok(())
     }

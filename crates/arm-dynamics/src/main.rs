@@ -38,6 +38,9 @@ enum Verb {
     },
 }
 
+/// Largest position that `--at` takes, rad or m: more was not meant.
+const FARTHEST: f64 = 1e4;
+
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask robot check scenarios/robots/sawyer.toml
@@ -92,8 +95,10 @@ fn run(arguments: &Arguments) -> Result<()> {
 fn check(arm: &Arm, file: &Path, at: Option<&[f64]>) -> Result<Check> {
     let count = arm.joints().len();
     let q: Vec<f64> = match at {
-        Some(at) if at.len() == count && at.iter().all(|value| value.is_finite()) => at.to_vec(),
-        Some(at) => bail!("--at: expected {count} numbers for {}, found {at:?}", file.display()),
+        Some(at) if at.len() == count && at.iter().all(|value| value.abs() <= FARTHEST) => at.to_vec(),
+        Some(at) => {
+            bail!("--at: expected {count} numbers from -{FARTHEST} to {FARTHEST} for {}, found {at:?}", file.display())
+        }
         None => arm
             .joints()
             .iter()

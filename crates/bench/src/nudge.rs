@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, anyhow};
 use physics_model::BodyState;
 use pomdp::{Outcome, Purpose, Seed};
 use push_task::Action;
@@ -45,7 +45,7 @@ pub fn run(root: &Path, task: &Task, trials: &Path) -> Result<Value> {
     let mut found: [Vec<[f64; 4]>; 3] = Default::default();
     for (number, line) in text.lines().enumerate() {
         let place = || format!("{}, line {}: expected a trial of `eval`", trials.display(), number + 1);
-        let trial: Value = serde_json::from_str(line).with_context(place)?;
+        let trial: Value = serde_json::from_str(line).map_err(|_| anyhow!("{}, found no JSON", place()))?;
         let seed = Seed(trial["seed"].as_u64().with_context(place)?);
         let mut particle = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
         let mut rng = seed.stream(Purpose::Truth, 0);

@@ -42,7 +42,7 @@ pub(crate) fn page(root: &Path) -> Result<Page> {
     let path = root.join("assets/glossary.toml");
     let text = std::fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let glossary: Glossary = toml::from_str(&text).with_context(|| path.display().to_string())?;
-    Ok(Page::new("concepts/glossary.md", written(&glossary.word)?))
+    Ok(Page::new("reference/glossary.md", written(&glossary.word)?))
 }
 
 fn written(words: &[Word]) -> Result<String> {

@@ -20,4 +20,4 @@ mod generate;
 mod plan;
 
 pub use generate::{EpisodeData, Generator};
-pub use plan::{plan, schema};
+pub use plan::{episodes, plan, schema};

@@ -28,9 +28,9 @@ struct Arguments {
     /// Root seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Number of shards of the dataset.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    shards: u32,
+    /// Number of shards of the dataset, at most one an episode [default: 20, or fewer].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    shards: Option<u32>,
     /// Who makes the shards: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
@@ -66,6 +66,8 @@ Examples:
   cargo xtask datagen --robot jaco --transitions 4000 --shards 4 --out runs/data/jaco-small";
 
 /// What went wrong after the input was found to be good.
+/// Shards where none are asked for.
+const SHARDS: u32 = 20;
 const FAILED: Failed = Failed::new("the run stopped, finished shards are kept");
 
 fn main() -> ExitCode {
@@ -157,8 +159,15 @@ impl Job {
         if transitions == 0 {
             return Err(anyhow!("--transitions: expected at least 1, found 0"));
         }
-        if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards) {
-            return Err(anyhow!("--worker: expected a shard below {}, found {shard}", arguments.shards));
+        let episodes = u32::try_from(datagen::episodes(&scenario, transitions)).unwrap_or(u32::MAX);
+        let shards = arguments.shards.unwrap_or(SHARDS.min(episodes));
+        if shards > episodes {
+            return Err(anyhow!(
+                "--shards: expected at most {episodes}, as {transitions} transitions take so many episodes, found {shards}"
+            ));
+        }
+        if let Some(shard) = arguments.worker.filter(|shard| *shard >= shards) {
+            return Err(anyhow!("--worker: expected a shard below {shards}, found {shard}"));
         }
         let folder = if arguments.quick { "runs/quick/data" } else { "runs/data" };
         let out = arguments.out.clone().unwrap_or_else(|| root.join(folder).join(&robot));
@@ -167,7 +176,7 @@ impl Job {
             unknown if unknown == "unknown" && arguments.worker.is_some() => Plan::read(&out)?.commit,
             commit => commit,
         };
-        let plan = datagen::plan(&scenario, commit, transitions, arguments.seed, arguments.shards);
+        let plan = datagen::plan(&scenario, commit, transitions, arguments.seed, shards);
         let generator = Generator::new(&scenario, &root, arguments.seed)?;
         Ok(Self { out, robot, hash: plan.hash(), plan, generator })
     }

@@ -21,10 +21,16 @@ pub fn schema(scenario: &Scenario) -> Schema {
     }
 }
 
+/// Episodes that hold at least `transitions` transitions, if no world diverges.
+#[must_use]
+pub fn episodes(scenario: &Scenario, transitions: u64) -> u64 {
+    transitions.div_ceil(scenario.data.episode_actions as u64)
+}
+
 /// Plan of a dataset of at least `transitions` transitions, if no world diverges, in `shards` shards.
 #[must_use]
 pub fn plan(scenario: &Scenario, commit: String, transitions: u64, seed: u64, shards: u32) -> Plan {
-    let episodes = transitions.div_ceil(scenario.data.episode_actions as u64);
+    let episodes = episodes(scenario, transitions);
     Plan {
         version: dataset::VERSION,
         schema: schema(scenario),

@@ -1,6 +1,6 @@
 //! The table of a run: JSON for machines, Markdown for people, CSV for spreadsheets.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use agent::{Method, Reason};
@@ -167,13 +167,16 @@ impl Table {
         text + "\n" + &self.words() + "\n"
     }
 
-    /// What success, interval, p and the methods of this table mean, as the glossary says.
+    /// What the columns, endings and methods of this table mean, as the glossary says; each word once.
     fn words(&self) -> String {
         let methods = self.rows.iter().map(|row| row.method.name());
+        let endings = self.rows.iter().flat_map(|row| row.reasons.keys().map(|reason| reason.name()));
+        let failures = self.rows.iter().flat_map(|row| row.failures.keys().map(|failure| failure.name()));
         let p = (!self.pairs.is_empty()).then_some("McNemar p");
-        let terms = ["success", "95 % interval"].into_iter().chain(p).chain(methods);
-        let defined = terms.filter_map(page::word).map(|word| format!("{}: {}", word.term, word.means));
-        defined.collect::<Vec<_>>().join(" ")
+        let terms = COLUMNS.into_iter().chain(p).chain(endings).chain(failures).chain(methods);
+        let mut told = BTreeSet::new();
+        let words = terms.filter_map(page::word).filter(|word| told.insert(&word.term));
+        words.map(|word| format!("{}: {}", word.term, word.means)).collect::<Vec<_>>().join(" ")
     }
 
     /// For spreadsheets.
@@ -231,6 +234,9 @@ pub(crate) fn published_cells(published: Option<Published>) -> [String; 2] {
     published.map_or_else(Default::default, |p| [p.successes.to_string(), p.trials.to_string()])
 }
 
+/// Columns of [`Table::to_markdown`] whose heads do not say all.
+const COLUMNS: [&str; 6] = ["success", "95 % interval", "ended by", "failed by", "steps to goal", "obstacle touched"];
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -250,9 +256,10 @@ mod tests {
             let means = page::word(method.name()).unwrap_or_else(|| panic!("{}", method.name())).means.as_str();
             assert!(last.contains(&format!("{}: {means}", method.name())), "{last}");
         }
-        for term in ["success: The number", "95 % interval: Wilson", "McNemar p: "] {
-            assert!(last.contains(term), "{term}: {last}");
+        for term in COLUMNS.into_iter().chain(["McNemar p"]) {
+            assert_eq!(last.matches(&format!("{term}: ")).count(), 1, "{term}: {last}");
         }
+        assert!(last.contains(" goal: The circle"), "how a trial ended: {last}");
         // Only what the table has.
         let one = table(&[Method::Heuristic]);
         assert!(one.contains("heuristic: ") && !one.contains("oracle") && !one.contains("McNemar"), "{one}");

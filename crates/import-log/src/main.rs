@@ -88,23 +88,23 @@ enum Samples {
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask import-log ros2 rig_bag --draft-map rig.toml
-  cargo xtask import-log ros2 rig_bag --map rig.toml --out runs/logs/rig";
+  cargo xtask import-log ros2 tests/data/import/ros2_mcap --draft-map rig.toml
+  cargo xtask import-log ros2 tests/data/import/ros2_mcap --map tests/data/import/ros2_mcap.toml --out runs/logs/rig";
 const TABLE_EXAMPLES: &str = "\
 Examples:
-  cargo xtask import-log table rig.csv --map rig.toml --out runs/logs/rig";
+  cargo xtask import-log table tests/data/import/rig.csv --map tests/data/import/rig.toml --out runs/logs/table";
 const MCAP_EXAMPLES: &str = "\
 Examples:
-  cargo xtask import-log mcap rig.mcap --map rig.toml --out runs/logs/rig";
+  cargo xtask import-log mcap tests/data/import/json.mcap --map tests/data/import/json.toml --out runs/logs/mcap";
 const ROS2_EXAMPLES: &str = "\
 Examples:
-  cargo xtask import-log ros2 rig_bag --map rig.toml --out runs/logs/rig";
+  cargo xtask import-log ros2 tests/data/import/ros2_sqlite --map tests/data/import/ros2_sqlite.toml --out runs/logs/ros2";
 const LEROBOT_EXAMPLES: &str = "\
 Examples:
-  cargo xtask import-log lerobot rig_dataset --map rig.toml --out runs/logs/rig";
+  cargo xtask import-log lerobot tests/data/import/lerobot --map tests/data/import/lerobot.toml --out runs/logs/lerobot";
 const CONTACTNETS_EXAMPLES: &str = "\
 Examples:
-  cargo xtask import-log contactnets tosses.csv --out runs/logs/tosses";
+  cargo xtask import-log contactnets tests/data/contactnets/tosses_12.csv --out runs/logs/tosses";
 const CMU_PUSH_EXAMPLES: &str = "\
 Examples:
   cargo xtask import-log cmu-push record.txt.gz --friction-force 5.0 --out runs/logs/push";

@@ -97,6 +97,9 @@ impl<'a> Csv<'a> {
         let names = reader.byte_headers().map_err(|e| csv_error(path, e))?;
         let name = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_start_matches('\u{feff}').to_string();
         let names: Vec<String> = names.iter().map(name).collect();
+        if names.iter().all(String::is_empty) {
+            return Err(Error::source(path, "row of names", "names of columns", "none"));
+        }
         for (i, name) in names.iter().enumerate() {
             if names[..i].contains(name) && !name.is_empty() {
                 return Err(Error::source(path, "row of names", "each name once", format!("{} twice", excerpt(name))));

@@ -279,9 +279,10 @@ fn within(key: &str, number: Number, range: Range, limit: f64) -> Result<(), Pro
     };
     let mean = number.mean();
     if !(mean >= low && mean <= limit) {
-        // As short as it is written: 1e-9, 0.
-        let low = format!("{low:?}");
-        return Err(Problem::key(key, format!("expected {} to {limit}, found {mean}", low.trim_end_matches(".0"))));
+        // As short as they are written: 1e-9, 0, 1e300.
+        let [low, mean] = [low, mean].map(|number| format!("{number:?}"));
+        let [low, mean] = [&low, &mean].map(|number| number.trim_end_matches(".0"));
+        return Err(Problem::key(key, format!("expected {low} to {limit}, found {mean}")));
     }
     if let Number::Uncertain { stddev, .. } = number
         && !(stddev > 0.0 && stddev.is_finite())

@@ -275,6 +275,9 @@ impl Config {
     }
 }
 
+/// More threads than any machine has: a number that was not meant.
+const MOST_THREADS: usize = 1024;
+
 impl Config {
     /// Checks every value against its limits.
     ///
@@ -285,7 +288,7 @@ impl Config {
         let (depth, trees) = (self.depth, self.trees);
         require(depth >= 1, "depth", &depth, "at least 1")?;
         require(trees >= 1, "trees", &trees, "at least 1")?;
-        require(self.threads >= 1, "threads", &self.threads, "at least 1")?;
+        require((1..=MOST_THREADS).contains(&self.threads), "threads", &self.threads, "between 1 and 1024")?;
         match self.budget {
             Budget::Simulations(n) => {
                 // Visits are counted in 32 bits, kept ones included.
@@ -427,7 +430,7 @@ mod tests {
         let expected: [(Change, &str); 11] = [
             (|c| c.depth = 0, "`depth` is 0, but must be at least 1"),
             (|c| c.trees = 0, "`trees` is 0, but must be at least 1"),
-            (|c| c.threads = 0, "`threads` is 0, but must be at least 1"),
+            (|c| c.threads = 0, "`threads` is 0, but must be between 1 and 1024"),
             (
                 |c| c.budget = Budget::Transitions(29),
                 "`budget.transitions` is 29, but must be at least depth × trees = 30",

@@ -6,8 +6,12 @@
 
 use std::collections::BTreeMap;
 
-use pomdp::{Belief, GenerativeModel, ObservationModel, Outcome, Policy, Rng, Step};
+use pomdp::{Belief, ObservationModel, Outcome, Rng, Step};
 use rand::RngExt as _;
+
+mod value;
+
+pub use value::{FullInformation, PricedUncertainty};
 
 /// One way that a step can end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -142,112 +146,9 @@ impl<S> Belief for ExactBelief<S> {
     }
 }
 
-/// Expected discounted return of the best policy that sees the state: a bound from above on what an agent can reach.
-#[derive(Clone, Debug)]
-pub struct FullInformation {
-    values: Vec<f64>,
-}
-
-impl FullInformation {
-    /// Value iteration in place, in turn upwards and downwards through the states, until no value changes by more than `tolerance`.
-    #[must_use]
-    pub fn solve<M: Finite>(model: &M, tolerance: f64) -> Self {
-        let mut solution = Self { values: vec![0.0; model.states()] };
-        loop {
-            let mut change = 0.0_f64;
-            for upwards in [true, false] {
-                for count in 0..solution.values.len() {
-                    let index = if upwards { count } else { solution.values.len() - 1 - count };
-                    let state = model.state(index);
-                    let values = model.actions().iter().map(|action| solution.action_value(model, &state, action));
-                    let best = values.fold(f64::NEG_INFINITY, f64::max);
-                    change = change.max((best - solution.values[index]).abs());
-                    solution.values[index] = best;
-                }
-            }
-            if change <= tolerance {
-                return solution;
-            }
-        }
-    }
-
-    /// Value of a state in which the episode goes on.
-    #[must_use]
-    pub fn value<M: Finite>(&self, model: &M, state: &M::State) -> f64 {
-        self.values[model.index(state)]
-    }
-
-    /// Value of an action in a state.
-    #[must_use]
-    pub fn action_value<M: Finite>(&self, model: &M, state: &M::State, action: &M::Action) -> f64 {
-        let mut value = 0.0;
-        model.successors(state, action, |next| {
-            let later = if next.outcome == Outcome::Continue { self.values[model.index(&next.state)] } else { 0.0 };
-            value += next.probability * (next.reward + model.discount() * later);
-        });
-        value
-    }
-
-    /// QMDP: the action with the highest mean value, the first of several.
-    #[must_use]
-    pub fn qmdp<M: Finite>(&self, model: &M, belief: &ExactBelief<M::State>) -> M::Action
-    where
-        M::State: Clone,
-    {
-        best(model, |action| self.mean_action_value(model, belief.probabilities(), action))
-    }
-
-    /// Mean of [`Self::action_value`] over weighted states, times the sum of the weights.
-    fn mean_action_value<'a, M: Finite>(
-        &self,
-        model: &M,
-        belief: impl Iterator<Item = (&'a M::State, f64)>,
-        action: &M::Action,
-    ) -> f64
-    where
-        M::State: 'a,
-    {
-        belief.map(|(state, weight)| weight * self.action_value(model, state, action)).sum()
-    }
-}
-
-/// The states of a belief with their weights.
-fn weighted<S>(belief: &[(S, f64)]) -> impl Iterator<Item = (&S, f64)> {
-    belief.iter().map(|(state, weight)| (state, *weight))
-}
-
-/// The action with the highest value, the first of several.
-fn best<M: GenerativeModel>(model: &M, value: impl Fn(&M::Action) -> f64) -> M::Action {
-    let actions = model.actions().iter().rev();
-    let best = actions.map(|a| (a, value(a))).max_by(|(_, a), (_, b)| a.total_cmp(b));
-    best.expect("a model has actions").0.clone()
-}
-
-impl<M: Finite> Policy<M> for FullInformation {
-    fn action(&self, model: &M, state: &M::State, _rng: &mut Rng) -> M::Action {
-        best(model, |action| self.action_value(model, state, action))
-    }
-
-    fn leaf_value(&self, model: &M, state: &M::State, _actions_left: usize) -> f64 {
-        self.value(model, state)
-    }
-
-    /// QMDP.
-    fn belief_action(&self, model: &M, belief: &[(M::State, f64)], _rng: &mut Rng) -> M::Action {
-        best(model, |action| self.mean_action_value(model, weighted(belief), action))
-    }
-
-    /// The value of QMDP: that of one more action for a belief, after which the state is known.
-    fn belief_value(&self, model: &M, belief: &[(M::State, f64)], _actions_left: usize) -> f64 {
-        let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
-        let value = |action| self.mean_action_value(model, weighted(belief), action);
-        model.actions().iter().map(value).fold(f64::NEG_INFINITY, f64::max) / total
-    }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
-    use pomdp::{Purpose, Seed};
+    use pomdp::{GenerativeModel, Policy, Purpose, Seed};
 
     use super::*;
 
@@ -295,7 +196,7 @@ pub(crate) mod tests {
     }
 
     /// Two rooms; a door leads on in half of the tries and pays 1, staying pays 0.4, and what is heard is the room with probability 0.8.
-    struct Rooms;
+    pub(crate) struct Rooms;
 
     impl GenerativeModel for Rooms {
         type State = bool;

@@ -27,6 +27,10 @@ pub struct Options {
     pub planner: Config,
     /// What its leaves are worth.
     pub leaf: Leaf,
+    /// Price of a nat that a belief leaves open, in units of reward: a leaf with [`Leaf::FullInformation`] is worth so much less. Needs branches that start
+    /// with states.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub price_of_uncertainty: f64,
     /// Most actions of an episode.
     pub horizon: usize,
     /// Particles of a belief; 0 where the belief is exact.
@@ -35,6 +39,10 @@ pub struct Options {
     pub directions: usize,
     /// VDP Tag: actions that make for where a particle of the belief will be.
     pub aims: usize,
+}
+
+fn is_zero(price: &f64) -> bool {
+    *price == 0.0
 }
 
 impl Options {
@@ -51,7 +59,15 @@ impl Options {
             nodes: 1 << 24,
             ..Config::default()
         };
-        Self { planner, leaf: Leaf::FullInformation, horizon: 100, particles: 0, directions: 0, aims: 0 }
+        Self {
+            planner,
+            leaf: Leaf::FullInformation,
+            price_of_uncertainty: 0.0,
+            horizon: 100,
+            particles: 0,
+            directions: 0,
+            aims: 0,
+        }
     }
 
     /// With the entry `key` (dots lead into tables) set to a TOML value.
@@ -60,8 +76,10 @@ impl Options {
     ///
     /// An unknown key, or a value that does not fit.
     pub(super) fn with(&self, key: &str, value: &str) -> Result<Self> {
-        let given: toml::Table = toml::from_str(&format!("value = {value}"))
-            .with_context(|| format!("the value of {key} is no TOML: {value}"))?;
+        // The parser's own words speak of a file that nobody wrote.
+        let given: toml::Table = toml::from_str(&format!("value = {value}")).map_err(|_| {
+            anyhow::anyhow!("{key}: expected a number or another TOML value (text in quotes), found {value}")
+        })?;
         let mut options = serde_json::to_value(self)?;
         let mut at = &mut options;
         let unknown = || format!("there is no option {key}: expected one of {}", json!(self));
@@ -94,6 +112,9 @@ mod tests {
         let unknown = options.with("planner.deep", "3").unwrap_err().to_string();
         assert!(unknown.starts_with("there is no option planner.deep"), "{unknown}");
         assert_eq!(options.with("particles", "-3").unwrap_err().to_string(), "particles cannot be -3");
-        assert_eq!(options.with("leaf", "no").unwrap_err().to_string(), "the value of leaf is no TOML: no");
+        assert_eq!(
+            options.with("leaf", "no").unwrap_err().to_string(),
+            "leaf: expected a number or another TOML value (text in quotes), found no"
+        );
     }
 }

@@ -3,7 +3,7 @@
 use planner::{Observations, Pomcp, Pomcpow, SearchReport};
 use pomdp::{Belief as _, Policy, Purpose, Rng, Seed, UniformPolicy};
 use problems::bits::Advice;
-use problems::finite::{ExactBelief, Finite, FullInformation};
+use problems::finite::{ExactBelief, Finite, FullInformation, PricedUncertainty};
 use problems::rock_sample::{Posterior, Tour};
 use problems::vdp_tag::{self, Chase, Wander};
 use problems::{InitialState, LaserTag, LightDark, Particles, RockSample, SubHunt, VdpTag, episode};
@@ -76,8 +76,9 @@ where
     M::Observation: Send,
     M::Key: Send,
 {
+    let priced = PricedUncertainty::new(known, options.price_of_uncertainty);
     let policy: &(dyn Policy<M> + Sync) = match options.leaf {
-        Leaf::FullInformation | Leaf::Heuristic | Leaf::Plan => known,
+        Leaf::FullInformation | Leaf::Heuristic | Leaf::Plan => &priced,
         Leaf::Random => &UniformPolicy,
     };
     let start_secs = thread_secs();

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Time between two lines where there is no terminal, s.
 const EVERY_SECS: u64 = 10;
 
-/// Shows how far a diagnosis is. The budget is what it may take at most; most take almost all of it.
+/// Shows how far a diagnosis is. The search has a budget, of which most take almost all; the comparison at the end is not in it.
 #[derive(Debug)]
 pub(crate) struct Bar {
     bar: ProgressBar,
@@ -20,7 +20,7 @@ pub(crate) struct Bar {
 impl Bar {
     pub(crate) fn new() -> Self {
         let bar = ProgressBar::new(0);
-        let style = "{bar:30} {pos} of at most {len} simulated episodes, {elapsed}, at most {eta} left: {msg}";
+        let style = "{bar:30} {pos} of about {len} simulated episodes, {elapsed}, about {eta} left: {msg}";
         bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
         bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar, due_secs: AtomicU64::new(EVERY_SECS) }
@@ -28,9 +28,9 @@ impl Bar {
 
     fn line(&self) {
         let (done, budget) = (self.bar.position(), self.bar.length().unwrap_or_default());
-        let left = if done == 0 { String::new() } else { format!(", at most {} s left", self.bar.eta().as_secs()) };
+        let left = if done == 0 { String::new() } else { format!(", about {} s left", self.bar.eta().as_secs()) };
         let elapsed = self.bar.elapsed().as_secs();
-        program::say!("{}: {done} of at most {budget} simulated episodes, {elapsed} s{left}", self.bar.message());
+        program::say!("{}: {done} of about {budget} simulated episodes, {elapsed} s{left}", self.bar.message());
     }
 }
 

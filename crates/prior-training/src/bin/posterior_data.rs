@@ -48,7 +48,7 @@ struct Arguments {
 }
 
 const EXAMPLES: &str = "\
-Example:
+Examples:
   cargo xtask posterior-data --data runs/data/sawyer-fixed --set data.movable_share=0.0 --out runs/starts/sawyer-fixed";
 
 /// What went wrong after the input was found to be good.
