@@ -44,7 +44,7 @@ const FARTHEST: f64 = 1e4;
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask robot check scenarios/robots/sawyer.toml
-  cargo xtask robot check panda.urdf --tip panda_hand --at 0,-0.5,0,-2,0,1.6,0.8";
+  cargo xtask robot check tests/data/joint-log/arm.urdf --tip flange --at 0,-0.5,0,-1,0,1,0.8,0";
 
 /// What `check` prints.
 #[derive(Debug, Serialize)]

@@ -21,6 +21,7 @@
 
 mod align;
 mod arm;
+mod arrival;
 mod check;
 mod clipped;
 mod geometry;

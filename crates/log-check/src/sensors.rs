@@ -3,6 +3,7 @@
 use measured_log::{Axis, Channel, Component, Episode, Log};
 use serde::Serialize;
 
+use crate::arrival;
 use crate::clipped::{clipped, dead_axes};
 use crate::suspicion::{Kind, Suspicion};
 
@@ -24,9 +25,10 @@ const RATE_SHARE: f64 = 0.004;
 const NEAR_RATE: f64 = 0.15;
 /// Nobody reads so many ticks apart, or so often a tick: that is another unit.
 const OTHER_UNIT: f64 = 50.0;
-/// Distances of rows that scatter by this share may be those of arrival: if motion is so many times smoother by the number of the row.
+/// Episodes whose lengths tell how well a rate is known.
+const MANY_EPISODES: usize = 5;
+/// Distances of rows that scatter by this share of their mean may be those of arrival.
 const JITTER_SHARE: f64 = 0.05;
-const SMOOTHER: f64 = 1.5;
 
 /// A sensor: columns that belong together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -140,28 +142,33 @@ fn sensor_clock(log: &Log, channel: Channel) -> Option<Clock> {
         let times: Vec<f64> = readings(episode, channel).map(|(row, _)| episode.time_secs[row]).collect();
         times.windows(2).map(|pair| pair[1] - pair[0]).collect()
     };
-    let mut steps: Vec<f64> = log.episodes.iter().flat_map(of_episode).collect();
+    let episodes: Vec<Vec<f64>> = log.episodes.iter().map(of_episode).filter(|steps| !steps.is_empty()).collect();
+    let mut steps: Vec<f64> = episodes.iter().flatten().copied().collect();
     let median = statistics::quantile(&mut steps, 0.5)?;
     // Whole numbers of readings, some of which were lost: without these the mean is not that of the sensor.
-    let (mut secs, mut count, mut squares, mut whole) = (0.0, 0.0, 0.0, 0_u32);
-    for step in &steps {
-        let ticks = (step / median).round().max(1.0);
-        secs += step;
-        count += ticks;
-        if ticks == 1.0 {
-            squares += (step - median).powi(2);
-            whole += 1;
-        }
-    }
-    let period_secs = secs / count;
-    let jitter_secs = (squares / f64::from(whole.max(1))).sqrt();
+    let ticks = |step: f64| (step / median).round().max(1.0);
+    let whole = || steps.iter().filter(|step| ticks(**step) == 1.0);
+    let jitter_secs = (whole().map(|step| (step - median).powi(2)).sum::<f64>() / whole().count().max(1) as f64).sqrt();
+    let spans: Vec<(f64, f64)> =
+        episodes.iter().map(|steps| (steps.iter().sum(), steps.iter().map(|step| ticks(*step)).sum())).collect();
+    let count: f64 = spans.iter().map(|(_, count)| count).sum();
+    let period_secs = spans.iter().map(|(secs, _)| secs).sum::<f64>() / count;
     Some(Clock {
         column: channel.name(),
         period_secs,
-        error_secs: jitter_secs / (steps.len() as f64).sqrt(),
+        error_secs: rate_error(&spans, period_secs).unwrap_or(jitter_secs / (steps.len() as f64).sqrt()),
         jitter_secs,
-        gaps: steps.len() - whole as usize,
+        gaps: steps.len() - whole().count(),
     })
+}
+
+/// Standard error of the mean distance between readings, from how far whole episodes, of (seconds, distances) each, are from it. What makes stamps uneven
+/// may add up over an episode or not: that shows between episodes and not within. `None` for fewer than [`MANY_EPISODES`].
+fn rate_error(spans: &[(f64, f64)], period_secs: f64) -> Option<f64> {
+    let n = spans.len() as f64;
+    let count: f64 = spans.iter().map(|(_, count)| count).sum();
+    let squares: f64 = spans.iter().map(|(secs, count)| (secs - period_secs * count).powi(2)).sum();
+    (spans.len() >= MANY_EPISODES).then(|| (squares * n / (n - 1.0)).sqrt() / count)
 }
 
 /// What looks wrong with rows and sensors.
@@ -196,13 +203,15 @@ fn of_clock(log: &Log, clock: &Clock) -> Option<Suspicion> {
     let period_secs = log.header.period_secs;
     let ms = |secs: f64| 1e3 * secs;
     if clock.jitter_secs > JITTER_SHARE * clock.period_secs
-        && let Some(smoother) = evenly(log).filter(|smoother| *smoother > SMOOTHER)
+        && let Some(followed) = arrival::stamps_followed(log).filter(arrival::Followed::is_of_arrival)
     {
         let found = format!(
-            "Readings come every {:.2} ms, give or take {:.2} ms, and motion is {smoother:.1} times smoother if they were read at equal distances: times are those of \
-             arrival, not of measurement.",
+            "Readings come every {:.2} ms, give or take {:.2} ms, and motion follows {:.0} ± {:.0} % of that unevenness: times are those of arrival, not of \
+             measurement.",
             ms(clock.period_secs),
-            ms(clock.jitter_secs)
+            ms(clock.jitter_secs),
+            1e2 * followed.share,
+            1e2 * followed.error
         );
         return Some(Suspicion::new(
             Kind::Jitter,
@@ -232,33 +241,6 @@ fn of_clock(log: &Log, clock: &Clock) -> Option<Suspicion> {
         );
         Suspicion::new(Kind::Rate, found, "Check which of the two is right.")
     })
-}
-
-/// How many times smoother the tool, else the object, moves by the number of its reading than by its time: the median distance of a place from the line between
-/// its neighbours, where these are apart.
-fn evenly(log: &Log) -> Option<f64> {
-    let place: fn(Axis) -> Channel =
-        if log.has(Channel::Tool(Axis::X)) { Channel::Tool } else { Channel::ObjectPosition };
-    let (mut ways, mut by_time, mut by_row) = (Vec::new(), Vec::new(), Vec::new());
-    for episode in &log.episodes {
-        let read: Vec<(f64, [f64; 3])> =
-            (0..episode.rows()).filter_map(|row| Some((episode.time_secs[row], episode.vector(place, row)?))).collect();
-        for three in read.windows(3) {
-            let off = |share: f64| -> f64 {
-                let line = |i: usize| three[0].1[i] + share * (three[2].1[i] - three[0].1[i]);
-                (0..3).map(|i| (three[1].1[i] - line(i)).powi(2)).sum::<f64>().sqrt()
-            };
-            ways.push((0..3).map(|i| (three[2].1[i] - three[0].1[i]).powi(2)).sum::<f64>().sqrt());
-            by_time.push(off((three[1].0 - three[0].0) / (three[2].0 - three[0].0)));
-            by_row.push(off(0.5));
-        }
-    }
-    // Those that go furthest: noise does not hide there what a wrong time makes of a speed.
-    let far = statistics::nearest_rank(ways.iter().copied(), 0.8)?;
-    let median = |off: &[f64]| {
-        statistics::nearest_rank(off.iter().zip(&ways).filter(|(_, way)| **way > far).map(|(off, _)| *off), 0.5)
-    };
-    Some(median(&by_time)? / median(&by_row)?.max(f64::MIN_POSITIVE))
 }
 
 /// Groups of columns that never change where others do.
