@@ -77,7 +77,10 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
         suspicions.extend(geometry::astray(log, &tool, &motions).map(of_astray));
     }
     let meant = geometry.as_ref().and_then(|suspicion| suspicion.readings.first().copied());
-    suspicions.extend(sensors::suspicions(log, &sensors, clock.as_ref(), &|index, secs| motions.sets_out(index, secs)));
+    let mass_kg = log.header.object.mass_kg.mean();
+    suspicions.extend(sensors::suspicions(log, &sensors, clock.as_ref(), &|index, secs, force_n| {
+        motions.is_blow(index, secs, force_n, mass_kg)
+    }));
     suspicions.extend(geometry);
     let contacts = Contacts::new(meant.as_ref(), log, &tool, &motions);
     let forces = contacts.forces(None);

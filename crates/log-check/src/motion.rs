@@ -47,6 +47,11 @@ pub(crate) struct Motions {
     pub(crate) turns: bool,
 }
 
+/// Hard bodies of some hundred grams touch about so long (Hertz), and no engine's step is much shorter.
+const BLOW_SECS: f64 = 0.001;
+/// How far an impulse may be above what speeds and mass say of it.
+const BLOW_MARGIN: f64 = 5.0;
+
 impl Motions {
     /// Of a log whose object is `size_m` wide. `tool` gives the tool centre of a row.
     pub(crate) fn new(log: &Log, size_m: f64, tool: impl Fn(&Episode, usize) -> Option<[f64; 3]>) -> Self {
@@ -70,11 +75,23 @@ impl Motions {
         Self { episodes, position_m, turns }
     }
 
-    /// Whether the object sets out in an episode, by its index, about a time, s.
-    pub(crate) fn sets_out(&self, index: usize, secs: f64) -> bool {
+    /// Whether a force for a moment, N, can be the blow by which an object of this mass sets out in an episode, by its index, about a time, s.
+    ///
+    /// A blow lasts [`BLOW_SECS`] or longer, and its impulse is what the object's speed changes by times its mass.
+    pub(crate) fn is_blow(&self, index: usize, secs: f64, force_n: f64, mass_kg: f64) -> bool {
         const ABOUT_SECS: f64 = 0.1;
         let motion = &self.episodes[index];
-        motion.onsets.iter().any(|onset| (motion.seen[*onset].secs - secs).abs() < ABOUT_SECS)
+        let sets_out = motion.onsets.iter().any(|onset| (motion.seen[*onset].secs - secs).abs() < ABOUT_SECS);
+        let around = motion.seen.windows(2).filter(|pair| {
+            pair[1].secs > secs - ABOUT_SECS && pair[0].secs < secs + ABOUT_SECS && pair[1].secs > pair[0].secs
+        });
+        let speed = |pair: &[Seen]| {
+            (pair[1].pose.translation.vector - pair[0].pose.translation.vector).norm() / (pair[1].secs - pair[0].secs)
+        };
+        // It may be thrown back as fast as it came.
+        let change_mps = around.map(speed).fold(None, |most: Option<f64>, speed| Some(most.unwrap_or(0.0).max(speed)));
+        let impulse_ns = change_mps.map(|change| 2.0 * change * mass_kg);
+        sets_out && impulse_ns.is_none_or(|impulse| force_n * BLOW_SECS <= BLOW_MARGIN * impulse)
     }
 
     /// Whether the object is a ball, or a cylinder that is seen to lie, or not seen to stand.

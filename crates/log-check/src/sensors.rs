@@ -176,7 +176,7 @@ pub(crate) fn suspicions(
     log: &Log,
     sensors: &[Sensor],
     clock: Option<&Clock>,
-    blow: &dyn Fn(usize, f64) -> bool,
+    blow: &dyn Fn(usize, f64, f64) -> bool,
 ) -> Vec<Suspicion> {
     let mut all: Vec<Suspicion> = dead(log).into_iter().map(|group| {
         let column = group[0].name();
@@ -281,9 +281,9 @@ pub fn without_dead(log: &Log) -> Option<Log> {
 
 /// Single readings, and of places up to [`MOST_AWAY`] in a row, that stand out from those before and after by far more than these from each other.
 ///
-/// Of places, which cannot go there and back; of forces only far beyond all others, and not where the object sets out: blows are as short. `blow`: whether it does,
-/// in an episode, by its index, at a time.
-fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64) -> bool) -> Option<Suspicion> {
+/// Of places, which cannot go there and back; of forces only far beyond all others, and not where they may be a blow, which is as short. `blow`: whether one is
+/// possible in an episode, by its index, at a time, s, with a force, N.
+fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) -> Option<Suspicion> {
     let forces = matches!(group[0], Channel::WristForce(_));
     if !forces && !matches!(group[0], Channel::Tool(_) | Channel::Joint(_) | Channel::ObjectPosition(_)) {
         return None;
@@ -322,7 +322,7 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64) -> bool) -> Op
                     [(0, 1), (1, 2), (3, 4), (4, 5)].map(|(a, b)| if a < 2 { (a, b) } else { (a + burst, b + burst) });
                 let near = near.map(|(a, b)| (value(b) - value(a)).abs());
                 let limit = SPIKE * near.into_iter().fold(usual, f64::max);
-                if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs))) {
+                if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs, value(3).abs()))) {
                     far.push((alone / usual, episode.id, secs, *channel, value(3), burst));
                 }
             }
