@@ -100,6 +100,9 @@ impl<'a> Csv<'a> {
         if names.iter().all(String::is_empty) {
             return Err(Error::source(path, "row of names", "names of columns", "none"));
         }
+        if let Some(name) = names.iter().find(|name| name.chars().any(|c| c.is_control() || c == '\u{fffd}')) {
+            return Err(Error::source(path, "row of names", "text: CSV or Parquet", excerpt(name)));
+        }
         for (i, name) in names.iter().enumerate() {
             if names[..i].contains(name) && !name.is_empty() {
                 return Err(Error::source(path, "row of names", "each name once", format!("{} twice", excerpt(name))));

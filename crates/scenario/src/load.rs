@@ -338,7 +338,7 @@ mod tests {
     fn what_is_no_number_is_refused_before_it_is_used() {
         let message = |set: &str| load(|s| s.set = vec![set.into()]).unwrap_err().to_string();
         let cases = [
-            ("world.arm_stiffness_npm=nan", "world.arm_stiffness_npm: expected above 0 N/m, found NaN"),
+            ("world.arm_stiffness_npm=nan", "world.arm_stiffness_npm: expected above 0 and at most 1e9 N/m, found NaN"),
             ("robot.home_rad=[nan, 0.0]", "robot: expected finite numbers in home_rad"),
             ("robot.locked_joints.head_pan=inf", "robot: expected finite numbers in home_rad"),
             ("robot.urdf=\"a\\tb.urdf\"", "robot.urdf: expected a path without control characters"),

@@ -105,7 +105,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     });
     let owner = Owner { program: "demo", subject: String::new() };
     whole_file::check_owner(&out, "trace.json").and_then(|()| owner.check(&out, &FILES)).map_err(|e| taken(&e))?;
-    std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display())).context(FAILED)?;
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
     let game = Game { arguments, scenario: &scenario, problem: &problem, method, prior: prior.as_ref() };
     let (record, trace) = game.play(scenario::commit(&root)).context(FAILED)?;
     owner.claim(&out).context(FAILED)?;
