@@ -9,8 +9,10 @@ use std::collections::BTreeMap;
 use pomdp::{Belief, ObservationModel, Outcome, Rng, Step};
 use rand::RngExt as _;
 
+mod lookahead;
 mod value;
 
+pub use lookahead::Lookahead;
 pub use value::{FullInformation, PricedUncertainty};
 
 /// One way that a step can end.
@@ -104,26 +106,22 @@ impl<S: Clone> ExactBelief<S> {
         action: &M::Action,
         observation: &M::Observation,
     ) -> Option<Self> {
-        let mut predicted: BTreeMap<usize, (S, f64)> = BTreeMap::new();
+        given(model, self.predicted(model, action).1, action, observation).map(Self::of)
+    }
+
+    /// Expected reward of `action`, and the states after it in an episode that goes on. Their probabilities sum to that of going on.
+    fn predicted<M: Finite<State = S>>(&self, model: &M, action: &M::Action) -> (f64, Vec<(S, f64)>) {
+        let (mut reward, mut predicted) = (0.0, BTreeMap::<usize, (S, f64)>::new());
         for (state, probability) in self.probabilities() {
             model.successors(state, action, |next| {
+                reward += probability * next.probability * next.reward;
                 if next.outcome == Outcome::Continue {
                     let entry = predicted.entry(model.index(&next.state));
                     entry.or_insert_with(|| (next.state, 0.0)).1 += probability * next.probability;
                 }
             });
         }
-        let logs: Vec<f64> = predicted.values().map(|(s, _)| model.log_likelihood(action, s, observation)).collect();
-        // Likelihoods relative to the largest one: eight sharp beams would leave the range of numbers.
-        let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        if most == f64::NEG_INFINITY {
-            return None;
-        }
-        let mut weighted: Vec<(S, f64)> =
-            predicted.into_values().zip(logs).map(|((state, p), log)| (state, p * (log - most).exp())).collect();
-        let total: f64 = weighted.iter().map(|(_, p)| p).sum();
-        weighted.iter_mut().for_each(|(_, p)| *p /= total);
-        (total > 0.0).then(|| Self::of(weighted))
+        (reward, predicted.into_values().collect())
     }
 
     /// States that are possible, with their probabilities.
@@ -134,6 +132,26 @@ impl<S: Clone> ExactBelief<S> {
             .zip(&self.cumulative)
             .map(move |(state, &sum)| (state, sum - std::mem::replace(&mut before, sum)))
     }
+}
+
+/// Predicted states with their probabilities after an observation. `None` where none explains it.
+fn given<M: Finite>(
+    model: &M,
+    predicted: Vec<(M::State, f64)>,
+    action: &M::Action,
+    observation: &M::Observation,
+) -> Option<Vec<(M::State, f64)>> {
+    let logs: Vec<f64> = predicted.iter().map(|(s, _)| model.log_likelihood(action, s, observation)).collect();
+    // Likelihoods relative to the largest one: eight sharp beams would leave the range of numbers.
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return None;
+    }
+    let mut weighted: Vec<(M::State, f64)> =
+        predicted.into_iter().zip(logs).map(|((state, p), log)| (state, p * (log - most).exp())).collect();
+    let total: f64 = weighted.iter().map(|(_, p)| p).sum();
+    weighted.iter_mut().for_each(|(_, p)| *p /= total);
+    (total > 0.0).then_some(weighted)
 }
 
 impl<S> Belief for ExactBelief<S> {

@@ -149,8 +149,9 @@ pub(super) fn rows(task: &Task) -> Result<Vec<Row>> {
     for entry in &task.set {
         let (key, value) = entry.split_once('=').with_context(|| format!("--set {entry} is not row.key=value"))?;
         let (name, key) = key.split_once('.').with_context(|| format!("--set {entry} is not row.key=value"))?;
+        let played = rows.iter().map(Row::name).collect::<Vec<_>>().join(", ");
         let Some(row) = rows.iter_mut().find(|row| row.name() == name) else {
-            bail!("--set {entry}: there is no row {name}: expected one of {}", names.join(", "));
+            bail!("--set {entry}: {name} is not among the rows to play: expected one of {played}");
         };
         row.options = row.options.with(key, value).with_context(|| format!("--set {entry}"))?;
     }

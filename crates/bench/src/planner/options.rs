@@ -31,6 +31,10 @@ pub struct Options {
     /// with states.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub price_of_uncertainty: f64,
+    /// Finite problems: observations that are drawn for each action by one exact step in place of a search; 0 for the search. RockSample: any other number
+    /// follows the plan for what is known.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub exact_step: usize,
     /// Most actions of an episode.
     pub horizon: usize,
     /// Particles of a belief; 0 where the belief is exact.
@@ -43,6 +47,10 @@ pub struct Options {
 
 fn is_zero(price: &f64) -> bool {
     *price == 0.0
+}
+
+fn is_none(draws: &usize) -> bool {
+    *draws == 0
 }
 
 impl Options {
@@ -63,6 +71,7 @@ impl Options {
             planner,
             leaf: Leaf::FullInformation,
             price_of_uncertainty: 0.0,
+            exact_step: 0,
             horizon: 100,
             particles: 0,
             directions: 0,

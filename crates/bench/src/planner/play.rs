@@ -3,7 +3,7 @@
 use planner::{Observations, Pomcp, Pomcpow, SearchReport};
 use pomdp::{Belief as _, Policy, Purpose, Rng, Seed, UniformPolicy};
 use problems::bits::Advice;
-use problems::finite::{ExactBelief, Finite, FullInformation, PricedUncertainty};
+use problems::finite::{ExactBelief, Finite, FullInformation, Lookahead, PricedUncertainty};
 use problems::rock_sample::{Posterior, Tour};
 use problems::vdp_tag::{self, Chase, Wander};
 use problems::{InitialState, LaserTag, LightDark, Particles, RockSample, SubHunt, VdpTag, episode};
@@ -47,11 +47,16 @@ struct Searches {
 
 impl Searches {
     fn count<A>(&mut self, search: impl FnOnce() -> SearchReport<A>) -> A {
-        let start = thread_secs();
-        let report = search();
-        self.secs += thread_secs() - start;
+        let report = self.time(search);
         self.simulations += report.simulations;
         report.action
+    }
+
+    fn time<A>(&mut self, search: impl FnOnce() -> A) -> A {
+        let start = thread_secs();
+        let found = search();
+        self.secs += thread_secs() - start;
+        found
     }
 
     fn played(&self, episode: episode::Episode, whole_secs: f64) -> Played {
@@ -88,7 +93,11 @@ where
     let learn = |belief: ExactBelief<M::State>, action: &M::Action, seen: &M::Observation, _: &mut Rng| {
         belief.update(model, action, seen).expect(EXPLAINS)
     };
-    let episode = if options.planner.observations == Observations::Classes {
+    let episode = if options.exact_step > 0 {
+        let step = Lookahead::new(priced, options.exact_step);
+        let decide = |belief: &ExactBelief<M::State>, _| searches.time(|| step.action(model, belief, &mut search));
+        episode::play_with(model, start, belief, options.horizon, &mut world, decide, learn)
+    } else if options.planner.observations == Observations::Classes {
         let mut planner = Pomcp::new(options.planner.clone()).expect(VALID);
         let decide = |belief: &ExactBelief<M::State>, left| {
             planner.reset();
@@ -147,6 +156,10 @@ pub(super) fn rock_sample(options: &Options) -> impl Fn(Seed, u64) -> Played {
                 planner.prune(action, observation);
             }
             let particles = posterior.particles(&model, options.particles, &mut belief);
+            if options.exact_step > 0 {
+                // What is known is the same in all of them.
+                return searches.time(|| Tour.action(&model, &particles.states()[0], &mut search));
+            }
             searches.count(|| planner.search(&model, &particles, policy, left, &mut search))
         };
         let learn = |(posterior, _): (Posterior, _), action: &_, seen: &_, _: &mut Rng| {
