@@ -49,7 +49,9 @@ pub(crate) struct Motions {
 
 /// Hard bodies of some hundred grams touch about so long (Hertz), and no engine's step is much shorter.
 const BLOW_SECS: f64 = 0.001;
-/// How far an impulse may be above what speeds and mass say of it.
+/// Before and after a blow an object's velocity is taken over so long.
+const BLOW_SIDE_SECS: f64 = 0.1;
+/// How far an impulse may be above what velocities and mass say of it: the object rubs on the table, and a stiff contact may be over sooner.
 const BLOW_MARGIN: f64 = 5.0;
 
 impl Motions {
@@ -75,23 +77,31 @@ impl Motions {
         Self { episodes, position_m, turns }
     }
 
-    /// Whether a force for a moment, N, can be the blow by which an object of this mass sets out in an episode, by its index, about a time, s.
+    /// Whether a force for a moment, N, can be a blow on an object of this mass in an episode, by its index, at a time, s.
     ///
-    /// A blow lasts [`BLOW_SECS`] or longer, and its impulse is what the object's speed changes by times its mass.
+    /// A blow lasts [`BLOW_SECS`] or longer, and its impulse is the mass times what the object's velocity changes by: where it sets out from rest at most twice its
+    /// largest speed about then, else what is seen before and after, if that is more than noise.
     pub(crate) fn is_blow(&self, index: usize, secs: f64, force_n: f64, mass_kg: f64) -> bool {
-        const ABOUT_SECS: f64 = 0.1;
         let motion = &self.episodes[index];
-        let sets_out = motion.onsets.iter().any(|onset| (motion.seen[*onset].secs - secs).abs() < ABOUT_SECS);
-        let around = motion.seen.windows(2).filter(|pair| {
-            pair[1].secs > secs - ABOUT_SECS && pair[0].secs < secs + ABOUT_SECS && pair[1].secs > pair[0].secs
-        });
-        let speed = |pair: &[Seen]| {
-            (pair[1].pose.translation.vector - pair[0].pose.translation.vector).norm() / (pair[1].secs - pair[0].secs)
+        let way = |a: &Seen, b: &Seen| b.pose.translation.vector - a.pose.translation.vector;
+        let possible = |change_mps: f64| force_n * BLOW_SECS <= BLOW_MARGIN * mass_kg * change_mps;
+        let about = |seen: &Seen| (seen.secs - secs).abs() < BLOW_SIDE_SECS;
+        if motion.onsets.iter().any(|onset| about(&motion.seen[*onset])) {
+            let moving =
+                motion.seen.windows(2).filter(|two| (about(&two[0]) || about(&two[1])) && two[1].secs > two[0].secs);
+            let speeds = moving.map(|two| way(&two[0], &two[1]).norm() / (two[1].secs - two[0].secs));
+            // It may be thrown back as fast as it came.
+            return speeds.reduce(f64::max).is_none_or(|fastest| possible(2.0 * fastest));
+        }
+        let velocity = |from_secs: f64| -> Option<Vector3<f64>> {
+            let inside = |seen: &&Seen| (from_secs..=from_secs + BLOW_SIDE_SECS).contains(&seen.secs);
+            let mut seen = motion.seen.iter().filter(inside);
+            let (first, last) = (seen.next()?, seen.next_back()?);
+            (last.secs > first.secs).then(|| way(first, last) / (last.secs - first.secs))
         };
-        // It may be thrown back as fast as it came.
-        let change_mps = around.map(speed).fold(None, |most: Option<f64>, speed| Some(most.unwrap_or(0.0).max(speed)));
-        let impulse_ns = change_mps.map(|change| 2.0 * change * mass_kg);
-        sets_out && impulse_ns.is_none_or(|impulse| force_n * BLOW_SECS <= BLOW_MARGIN * impulse)
+        let (Some(before), Some(after)) = (velocity(secs - BLOW_SIDE_SECS), velocity(secs)) else { return false };
+        let change_mps = (after - before).norm();
+        change_mps > SIGMAS * 2.0 * self.position_m / BLOW_SIDE_SECS && possible(change_mps)
     }
 
     /// Whether the object is a ball, or a cylinder that is seen to lie, or not seen to stand.
