@@ -65,9 +65,9 @@ Examples:
   cargo xtask datagen --quick
   cargo xtask datagen --robot jaco --transitions 4000 --shards 4 --out runs/data/jaco-small";
 
-/// What went wrong after the input was found to be good.
 /// Shards where none are asked for.
 const SHARDS: u32 = 20;
+/// What went wrong after the input was found to be good.
 const FAILED: Failed = Failed::new("the run stopped, finished shards are kept");
 
 fn main() -> ExitCode {
