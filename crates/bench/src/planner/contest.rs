@@ -17,7 +17,7 @@ use pomdp::Seed;
 use problems::episode::mean_and_error;
 use serde_json::{Map, Value, json};
 
-use super::options::{Leaf, Options};
+use super::options::{Decide, Leaf, Options};
 use super::play::{self, Played};
 use super::{Effort, Task};
 
@@ -169,8 +169,15 @@ impl Row {
     }
 
     fn check(&self) -> Result<()> {
-        let Options { planner, horizon, particles, .. } = &self.options;
+        let Options { planner, horizon, particles, price_of_uncertainty: price, decide, .. } = &self.options;
         planner.validate()?;
+        ensure!(price.is_finite() && *price >= 0.0, "price_of_uncertainty is {price}: expected 0 or more");
+        match (decide, self.problem) {
+            (None, _) | (Some(Decide::Plan), Problem::RockSample) => {}
+            (Some(Decide::ExactStep(draws)), _) if *draws == 0 => bail!("exact_step is 0: a step needs an observation"),
+            (Some(Decide::Qmdp | Decide::ExactStep(_)), Problem::LightDark | Problem::LaserTag | Problem::SubHunt) => {}
+            (Some(decide), _) => bail!("decide cannot be {decide:?} here"),
+        }
         ensure!(*horizon > 0, "horizon is 0: an episode needs an action");
         let exact = !matches!(self.problem, Problem::VdpTag | Problem::RockSample);
         ensure!(exact || *particles > 0, "particles is 0: this belief needs some");
@@ -285,6 +292,10 @@ mod tests {
         assert!(refused(&[], &["vdp_tag.particles=0"]).contains("vdp_tag: particles is 0"));
         assert!(refused(&[], &["vdp_tag.planner.observations=\"classes\""]).contains("must be widening"));
         assert!(refused(&[], &["light_dark.planner.depth=0"]).contains("depth"));
+        assert!(refused(&[], &["laser_tag.price_of_uncertainty=-1.0"]).contains("expected 0 or more"));
+        assert!(refused(&[], &["laser_tag.decide=\"plan\""]).contains("decide cannot be Plan here"));
+        assert!(refused(&[], &["laser_tag.decide={ exact_step = 0 }"]).contains("needs an observation"));
+        assert!(refused(&[], &["vdp_tag.decide=\"qmdp\""]).contains("decide cannot be Qmdp here"));
     }
 
     #[test]

@@ -19,6 +19,18 @@ pub enum Leaf {
     Plan,
 }
 
+/// What takes a decision in place of the search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decide {
+    /// Finite problems: the action that is best where the state is known after it.
+    Qmdp,
+    /// Finite problems: one exact step, with so many draws of an observation for each action.
+    ExactStep(usize),
+    /// RockSample: a new plan for what is known.
+    Plan,
+}
+
 /// Options of a row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -31,10 +43,9 @@ pub struct Options {
     /// with states.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub price_of_uncertainty: f64,
-    /// Finite problems: observations that are drawn for each action by one exact step in place of a search; 0 for the search. RockSample: any other number
-    /// follows the plan for what is known.
-    #[serde(default, skip_serializing_if = "is_none")]
-    pub exact_step: usize,
+    /// What decides in place of the search; the search where this is not set.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decide: Option<Decide>,
     /// Most actions of an episode.
     pub horizon: usize,
     /// Particles of a belief; 0 where the belief is exact.
@@ -47,10 +58,6 @@ pub struct Options {
 
 fn is_zero(price: &f64) -> bool {
     *price == 0.0
-}
-
-fn is_none(draws: &usize) -> bool {
-    *draws == 0
 }
 
 impl Options {
@@ -71,7 +78,7 @@ impl Options {
             planner,
             leaf: Leaf::FullInformation,
             price_of_uncertainty: 0.0,
-            exact_step: 0,
+            decide: None,
             horizon: 100,
             particles: 0,
             directions: 0,

@@ -8,7 +8,7 @@ use problems::rock_sample::{Posterior, Tour};
 use problems::vdp_tag::{self, Chase, Wander};
 use problems::{InitialState, LaserTag, LightDark, Particles, RockSample, SubHunt, VdpTag, episode};
 
-use super::options::{Leaf, Options};
+use super::options::{Decide, Leaf, Options};
 use crate::physics::thread_secs;
 
 /// How an episode went, and what its searches cost.
@@ -93,9 +93,13 @@ where
     let learn = |belief: ExactBelief<M::State>, action: &M::Action, seen: &M::Observation, _: &mut Rng| {
         belief.update(model, action, seen).expect(EXPLAINS)
     };
-    let episode = if options.exact_step > 0 {
-        let step = Lookahead::new(priced, options.exact_step);
-        let decide = |belief: &ExactBelief<M::State>, _| searches.time(|| step.action(model, belief, &mut search));
+    let episode = if let Some(decide) = options.decide {
+        let decide = |belief: &ExactBelief<M::State>, _| {
+            searches.time(|| match decide {
+                Decide::ExactStep(draws) => Lookahead::new(priced, draws).action(model, belief, &mut search),
+                Decide::Qmdp | Decide::Plan => known.qmdp(model, belief),
+            })
+        };
         episode::play_with(model, start, belief, options.horizon, &mut world, decide, learn)
     } else if options.planner.observations == Observations::Classes {
         let mut planner = Pomcp::new(options.planner.clone()).expect(VALID);
@@ -156,7 +160,7 @@ pub(super) fn rock_sample(options: &Options) -> impl Fn(Seed, u64) -> Played {
                 planner.prune(action, observation);
             }
             let particles = posterior.particles(&model, options.particles, &mut belief);
-            if options.exact_step > 0 {
+            if options.decide.is_some() {
                 // What is known is the same in all of them.
                 return searches.time(|| Tour.action(&model, &particles.states()[0], &mut search));
             }

@@ -2,6 +2,7 @@
 
 use pomdp::{Belief as _, Outcome, Policy as _, Rng};
 
+use super::value::best;
 use super::{ExactBelief, Finite, PricedUncertainty, given};
 
 /// States below this share of a belief do not change what it is worth.
@@ -37,14 +38,7 @@ impl<'a> Lookahead<'a> {
     where
         M::State: Clone,
     {
-        let mut best: Option<(f64, &M::Action)> = None;
-        for action in model.actions() {
-            let worth = self.action_value(model, belief, action, rng);
-            if best.is_none_or(|(most, _)| worth > most) {
-                best = Some((worth, action));
-            }
-        }
-        best.expect("a model has actions").1.clone()
+        best(model, |action| self.action_value(model, belief, action, rng))
     }
 
     fn action_value<M: Finite>(

@@ -81,9 +81,9 @@ fn weighted<S>(belief: &[(S, f64)]) -> impl Iterator<Item = (&S, f64)> {
 }
 
 /// The action with the highest value, the first of several.
-fn best<M: GenerativeModel>(model: &M, value: impl Fn(&M::Action) -> f64) -> M::Action {
-    let actions = model.actions().iter().rev();
-    let best = actions.map(|a| (a, value(a))).max_by(|(_, a), (_, b)| a.total_cmp(b));
+pub(super) fn best<M: GenerativeModel>(model: &M, mut value: impl FnMut(&M::Action) -> f64) -> M::Action {
+    let valued = model.actions().iter().map(|action| (action, value(action)));
+    let best = valued.reduce(|best, next| if next.1.total_cmp(&best.1).is_gt() { next } else { best });
     best.expect("a model has actions").0.clone()
 }
 
