@@ -9,7 +9,7 @@ use crate::mapping::Mapping;
 use crate::plan::{Part, Pick, Plan, Quantity, Stamp, Track};
 use crate::rows::{moment, too_large};
 use crate::store::{Moment, Store};
-use crate::value::{Path, Value};
+use crate::value::{Path, Value, join};
 
 /// Topics that a message of this program lists.
 const LISTED: usize = 40;
@@ -47,7 +47,18 @@ struct Compiled {
     messages: u64,
     /// Which of its numbers were ever there.
     found: Vec<bool>,
+    /// What the first message holds that lacks some.
+    fields: Vec<String>,
     zero_stamps: u64,
+}
+
+impl Compiled {
+    /// Keeps what a message holds that lacks something.
+    fn look(&mut self, message: &Value) {
+        if self.fields.is_empty() {
+            self.fields = message.fields();
+        }
+    }
 }
 
 /// Takes from each message what a plan asks for.
@@ -85,6 +96,7 @@ impl<'a> Extractor<'a> {
                 stamp,
                 messages: 0,
                 found: vec![false; track.picks.len()],
+                fields: Vec::new(),
                 zero_stamps: 0,
             });
             if let Some(topic) = &track.topic {
@@ -108,13 +120,7 @@ impl<'a> Extractor<'a> {
                 return Err(self.mapping.wrong(track.topic_key(), reason));
             }
             if compiled.found.contains(&false) {
-                let reason = format!(
-                    "expected readings at all paths in messages of {}, found {} messages without some{}",
-                    excerpt(topic),
-                    compiled.messages,
-                    if track.picks.len() >= 4 { " (a quaternion that is a list needs its order)" } else { "" }
-                );
-                return Err(self.mapping.wrong(track.quantity.key(), reason));
+                return Err(self.mapping.wrong(track.quantity.key(), not_there(track, compiled)));
             }
         }
         Ok(())
@@ -124,7 +130,10 @@ impl<'a> Extractor<'a> {
         let track = &self.plan.tracks[index];
         let compiled = &mut self.tracks[index];
         compiled.messages += 1;
-        let Some(value) = compiled.at.follow(&message.value) else { return Ok(()) };
+        let Some(value) = compiled.at.follow(&message.value) else {
+            compiled.look(&message.value);
+            return Ok(());
+        };
         let mut picked = Vec::with_capacity(track.width());
         for source in &compiled.sources {
             picked.push(match source {
@@ -146,6 +155,9 @@ impl<'a> Extractor<'a> {
                     }
                 }
             });
+        }
+        if picked.iter().any(|value| value.is_nan()) {
+            compiled.look(&message.value);
         }
         if picked.iter().all(|value| value.is_nan()) {
             return Ok(());
@@ -194,12 +206,45 @@ impl Sink for Extractor<'_> {
     }
 }
 
+/// What a track never found: its paths, beside those that there are.
+fn not_there(track: &Track, compiled: &Compiled) -> String {
+    let missing = track.picks.iter().zip(&compiled.found).filter(|(_, found)| !**found);
+    let some = compiled.found.contains(&true);
+    let (mut paths, mut unordered) = (Vec::new(), false);
+    for (pick, _) in missing {
+        let Pick::Value { path, part } = pick else { continue };
+        unordered |= some && matches!(part, Part::Of(None, _));
+        let path = match part {
+            Part::Named(name) => format!("{path} of {name}"),
+            Part::All | Part::Of(..) => path.clone(),
+        };
+        let path = excerpt(&if track.at.is_empty() { path } else { join(&track.at, &path) });
+        if !paths.contains(&path) {
+            paths.push(path);
+        }
+    }
+    let fields: Vec<String> = compiled.fields.iter().map(|field| excerpt(field)).collect();
+    format!(
+        "expected readings at {} in messages of {}, which hold {}, found {} messages without some{}",
+        paths.join(" and "),
+        excerpt(track.topic.as_deref().unwrap_or_default()),
+        if fields.is_empty() { "others".into() } else { fields.join(", ") },
+        compiled.messages,
+        if unordered { " (a quaternion that is a list needs its order)" } else { "" }
+    )
+}
+
 fn unstamped(message: &Message<'_>, track: &Track, found: &str) -> Error {
     let path = match &track.stamp {
         Stamp::Field(path) => path.as_str(),
         _ => "header.stamp",
     };
-    let expected = format!("a time at {path}, or another clock for {}.stamp, such as log", track.quantity.key());
+    let fields: Vec<String> = message.value.fields().iter().map(|field| excerpt(field)).collect();
+    let expected = format!(
+        "a time at {path}, or another clock for {}.stamp, such as log (a message holds {})",
+        track.quantity.key(),
+        fields.join(", ")
+    );
     Error::source(message.path, format!("topic {}", excerpt(message.topic)), &expected, found)
 }
 

@@ -44,7 +44,7 @@ impl RawRigid {
             }
             (None, Some(rpy), None) => {
                 if let Some(wrong) = rpy.iter().find(|v| !(-1e4..=1e4).contains(*v)) {
-                    return Err(("rpy_deg", format!("expected angles in degrees, found {wrong}")));
+                    return Err(("rpy_deg", format!("expected angles in degrees, found {wrong:e}")));
                 }
                 from_rpy(rpy.map(f64::to_radians))
             }

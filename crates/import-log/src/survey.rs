@@ -8,12 +8,11 @@ use crate::Error;
 use crate::columns::role;
 use crate::draft::median_step;
 use crate::messages::{Message, Sink};
-use crate::value::Value;
+use crate::value::{Value, join};
 
-/// Messages of a topic that are looked at, topics, and fields that are listed.
+/// Messages of a topic that are looked at, and topics.
 const LOOKED_AT: usize = 20;
 const MOST_TOPICS: usize = 1000;
-const MOST_FIELDS: usize = 24;
 
 #[derive(Debug, Default)]
 pub(crate) struct Topic {
@@ -135,10 +134,6 @@ fn has(value: &Value, names: &[&str]) -> bool {
     names.iter().all(|name| value.part(usize::MAX, name).and_then(Value::number).is_some())
 }
 
-fn join(prefix: &str, name: &str) -> String {
-    if prefix.is_empty() { name.to_string() } else { format!("{prefix}.{name}") }
-}
-
 /// Finds poses and wrenches by their structure.
 fn walk(topic: &str, at: &str, prefix: &str, value: &Value, found: &mut Vec<Found>) {
     match value {
@@ -201,30 +196,8 @@ impl Topic {
         median_step(&self.log_secs).map(|step| (step * 1e4).round() / 1e4).filter(|step| *step > 0.0)
     }
 
-    /// Paths to the numbers and texts of its first message.
+    /// Paths to the numbers and texts of its fullest message.
     pub(crate) fn fields(&self) -> Vec<String> {
-        let mut fields = Vec::new();
-        if let Some(value) = &self.value {
-            list(value, "", &mut fields);
-        }
-        fields
-    }
-}
-
-fn list(value: &Value, prefix: &str, fields: &mut Vec<String>) {
-    if fields.len() >= MOST_FIELDS {
-        return;
-    }
-    match value {
-        Value::Struct(inner) => {
-            for (name, value) in inner {
-                list(value, &join(prefix, name), fields);
-            }
-        }
-        Value::List(inner) => match inner.first() {
-            Some(Value::Struct(_)) => list(&inner[0], &format!("{prefix}[0]"), fields),
-            _ => fields.push(format!("{prefix}[{}]", inner.len())),
-        },
-        _ => fields.push(prefix.into()),
+        self.value.as_ref().map(Value::fields).unwrap_or_default()
     }
 }

@@ -7,6 +7,9 @@ pub(crate) const MOST_VALUES: usize = 200_000;
 /// Elements of a list of numbers from which on it is not looked at: pictures and point clouds.
 pub(crate) const LONGEST_LIST: usize = 65_536;
 
+/// Fields that are listed of a message.
+const MOST_FIELDS: usize = 24;
+
 /// A part of a message, or a cell of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Value {
@@ -59,6 +62,36 @@ impl Value {
             _ => None,
         }
     }
+
+    /// Paths to its numbers and texts, the first ones of many; of a list of messages those of the first one.
+    pub(crate) fn fields(&self) -> Vec<String> {
+        let mut fields = Vec::new();
+        self.list("", &mut fields);
+        fields
+    }
+
+    fn list(&self, prefix: &str, fields: &mut Vec<String>) {
+        if fields.len() >= MOST_FIELDS {
+            return;
+        }
+        match self {
+            Self::Struct(inner) => {
+                for (name, value) in inner {
+                    value.list(&join(prefix, name), fields);
+                }
+            }
+            Self::List(inner) => match inner.first() {
+                Some(first @ Self::Struct(_)) => first.list(&format!("{prefix}[0]"), fields),
+                _ => fields.push(format!("{prefix}[{}]", inner.len())),
+            },
+            _ => fields.push(prefix.into()),
+        }
+    }
+}
+
+/// A path one field longer.
+pub(crate) fn join(prefix: &str, name: &str) -> String {
+    if prefix.is_empty() { name.to_string() } else { format!("{prefix}.{name}") }
 }
 
 #[derive(Clone, Debug, PartialEq)]

@@ -162,12 +162,12 @@ fn topics_and_paths_that_are_not_there_are_named_with_what_is() {
         (
             "\"pose.position\"",
             "\"pose.place\"",
-            "key `tool`: expected readings at all paths in messages of `/tcp`, found 128 messages",
+            "key `tool`: expected readings at `pose.place` in messages of `/tcp`, which hold `header.stamp.sec`, ",
         ),
         (
             "child_frame_id=box",
             "child_frame_id=bax",
-            "key `object`: expected readings at all paths in messages of `/tf`",
+            "key `object`: expected readings at `transforms[child_frame_id=bax].transform.translation` and ",
         ),
         ("\"/command\"", "\"/trial\"", "key `command`: expected readings"),
         ("stamp = \"header\"", "stamp = \"header.frame_id\"", "expected a time at header.frame_id"),

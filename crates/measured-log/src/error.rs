@@ -17,6 +17,12 @@ pub enum Error {
         /// Why it failed.
         source: std::io::Error,
     },
+    /// A file in place of a log's folder.
+    #[error("{} is a file: expected the folder of a log, with log.toml and samples.csv or samples.parquet", path.display())]
+    NoFolder {
+        /// The file.
+        path: PathBuf,
+    },
     /// The folder for a log is none, or holds results of another kind.
     #[error("{source}: {}", source.source)]
     Taken {

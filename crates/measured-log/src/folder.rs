@@ -47,6 +47,9 @@ impl Format {
 ///
 /// [`Error`] with file, row and column, or key, and what was expected.
 pub fn read(dir: &Path) -> Result<Log, Error> {
+    if dir.is_file() {
+        return Err(Error::NoFolder { path: dir.to_owned() });
+    }
     let header_path = dir.join(HEADER);
     let bytes = read_bounded(&header_path, MAX_HEADER_BYTES)?;
     let text = std::str::from_utf8(&bytes).map_err(|e| Error::Syntax {

@@ -209,6 +209,8 @@ fn a_folder_without_samples_or_with_two_is_refused() {
     assert!(message.starts_with("cannot read log.toml: "), "{message}");
     std::fs::write(folder.path().join("log.toml"), HEADER).unwrap();
     assert!(read_folder(folder.path()).unwrap_err().ends_with("found neither"));
+    let message = read_folder(&folder.path().join("log.toml")).unwrap_err();
+    assert!(message.contains("is a file: expected the folder of a log"), "{message}");
     for name in ["samples.csv", "samples.parquet"] {
         std::fs::write(folder.path().join(name), SAMPLES).unwrap();
     }

@@ -209,6 +209,10 @@ mod tests {
             let message = selection.load().unwrap_err().to_string();
             assert_eq!(message, format!("{mine}: key `{key}`: `{key}` is missing"));
         }
+        // A file of another kind, whose keys would only be missed elsewhere.
+        let other = root.join("scenarios/d4.toml").display().to_string();
+        let message = Selection { robot: other.clone(), ..Selection::new(&root) }.load().unwrap_err().to_string();
+        assert_eq!(message, format!("{other}: key `robot`: `robot` is missing"));
     }
 
     #[test]

@@ -64,7 +64,12 @@ impl Selection {
         ];
         let mut layers = Layers::default();
         for (kind, path) in paths.into_iter().chain(quick.map(|path| (LayerKind::Quick, path))) {
-            layers.push(kind, path.display().to_string(), read(&path)?);
+            let (name, table) = (path.display().to_string(), read(&path)?);
+            // Of a file that is no arm, whatever else it says would be missed in others.
+            if kind == LayerKind::Robot && !table.get("robot").is_some_and(Value::is_table) {
+                return Err(Error::Key { file: name, key: "robot".into(), message: "`robot` is missing".into() });
+            }
+            layers.push(kind, name, table);
         }
         if let Some(path) = &self.effects {
             layers.push(LayerKind::Effects, path.display().to_string(), read_effects(path)?);
