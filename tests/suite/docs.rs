@@ -100,7 +100,9 @@ fn every_option_in_the_documents_exists() {
 /// Verbs that a verb has of its own.
 fn verbs_of(verb: &str) -> &'static [&'static str] {
     match verb {
-        "bench" => &["physics", "calibration", "nudge", "policy", "planner", "prior", "accuracy", "log-check"],
+        "bench" => {
+            &["physics", "calibration", "nudge", "policy", "decision", "planner", "prior", "accuracy", "log-check"]
+        }
         "import-log" => &["table", "mcap", "ros2", "lerobot", "contactnets", "cmu-push"],
         "log" => &["check", "align"],
         "robot" => &["check"],

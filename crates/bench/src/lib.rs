@@ -21,6 +21,7 @@
 pub mod accuracy;
 pub mod calibration;
 pub mod closed_forms;
+pub mod decision;
 pub mod log_faults;
 pub mod nudge;
 pub mod peer;

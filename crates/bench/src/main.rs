@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
-use bench::{calibration, log_faults, nudge, planner, policy, prior, report};
+use bench::{calibration, decision, log_faults, nudge, planner, policy, prior, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
 use serde_json::Value;
@@ -104,6 +104,28 @@ enum What {
         /// Prints the steps of this world alone.
         #[arg(long, value_name = "WORLD")]
         trace: Option<u32>,
+        /// Overrides a scenario entry: key=value.
+        #[arg(long = "set", value_name = "KEY=VALUE")]
+        set: Vec<String>,
+    },
+    /// How long a decision takes: the search before each action, and the update of the belief after it.
+    #[command(after_help = "Examples:\n  cargo xtask bench decision --domain D4 --worlds 2 --threads 2")]
+    Decision {
+        /// Domain: D1 to D5, or a scenario file.
+        #[arg(long, default_value = "D4")]
+        domain: String,
+        /// Arm: sawyer, jaco, or a robot file.
+        #[arg(long, default_value = "sawyer")]
+        robot: String,
+        /// Worlds, played one after the other.
+        #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+        worlds: u32,
+        /// Root seed.
+        #[arg(long, default_value_t = 1)]
+        seed: u64,
+        /// Threads of search and update [default: all cores].
+        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
         /// Overrides a scenario entry: key=value.
         #[arg(long = "set", value_name = "KEY=VALUE")]
         set: Vec<String>,
@@ -221,6 +243,13 @@ fn run(arguments: &Arguments) -> Result<()> {
             let (domain, robot, set) = (domain.clone(), robot.clone(), set.clone());
             let task = policy::Task { domain, robot, worlds: *worlds, seed: *seed, blind: *blind, trace: *trace, set };
             program::out!("{}", policy::run(&root, &task)?);
+        }
+        What::Decision { domain, robot, worlds, seed, threads, set } => {
+            let (domain, robot, set) = (domain.clone(), robot.clone(), set.clone());
+            let threads = threads.map_or(0, usize::from);
+            let task = decision::Task { domain, robot, worlds: *worlds, seed: *seed, threads, set };
+            let figures = decision::run(&root, &task, |text| program::say!("{text}"))?;
+            program::out!("{}", serde_json::to_string_pretty(&figures)?);
         }
         What::Planner { episodes, quick, only, seed, set, out, json } => {
             let effort = planner::Effort { episodes: *episodes, quick: *quick };

@@ -373,9 +373,11 @@ impl Policy<RockSample> for Advice {
 }
 
 mod posterior;
+mod steps;
 mod tour;
 
 pub use posterior::Posterior;
+pub use steps::Steps;
 pub use tour::{Plan, Tour};
 
 #[cfg(test)]

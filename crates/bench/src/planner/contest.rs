@@ -174,6 +174,12 @@ impl Row {
         ensure!(price.is_finite() && *price >= 0.0, "price_of_uncertainty is {price}: expected 0 or more");
         match (decide, self.problem) {
             (None, _) | (Some(Decide::Plan), Problem::RockSample) => {}
+            (Some(Decide::PlanAfter(steps)), Problem::RockSample) => {
+                ensure!(
+                    (1..=3).contains(steps),
+                    "plan_after is {steps}: expected 1 to 3 steps, each of which takes 30 times as long as the last"
+                );
+            }
             (Some(Decide::ExactStep(draws)), _) if *draws == 0 => bail!("exact_step is 0: a step needs an observation"),
             (Some(Decide::Qmdp | Decide::ExactStep(_)), Problem::LightDark | Problem::LaserTag | Problem::SubHunt) => {}
             (Some(decide), _) => bail!("decide cannot be {decide:?} here"),
@@ -250,6 +256,7 @@ impl Row {
             "belief_seconds_per_decision": other_secs / decisions as f64,
             "decisions_per_episode": decisions as f64 / played.len() as f64,
             "returns": { key: { "mean": mean, "stderr": stderr, "n": played.len() } },
+            "return_of_each_episode": returns,
             "published": published,
             "published_source": self.problem.source(),
             "tuning_seeds": TUNING_SEEDS,

@@ -3,7 +3,7 @@
 use anyhow::{Context as _, Result};
 use planner::{ActionPriors, Backup, Budget, Config, Exploration, Observations, RolloutDepth};
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 /// What a new leaf of a search is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,6 +29,8 @@ pub enum Decide {
     ExactStep(usize),
     /// RockSample: a new plan for what is known.
     Plan,
+    /// RockSample: so many exact steps before the plan.
+    PlanAfter(usize),
 }
 
 /// Options of a row.
@@ -98,7 +100,7 @@ impl Options {
         })?;
         let mut options = serde_json::to_value(self)?;
         let mut at = &mut options;
-        let unknown = || format!("there is no option {key}: expected one of {}", json!(self));
+        let unknown = || format!("there is no option {key}");
         for part in key.split('.') {
             // Some are not written where they have their default.
             at = at.as_object_mut().with_context(unknown)?.entry(part).or_insert(Value::Null);

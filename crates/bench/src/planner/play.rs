@@ -4,7 +4,7 @@ use planner::{Observations, Pomcp, Pomcpow, SearchReport};
 use pomdp::{Belief as _, Policy, Purpose, Rng, Seed, UniformPolicy};
 use problems::bits::Advice;
 use problems::finite::{ExactBelief, Finite, FullInformation, Lookahead, PricedUncertainty};
-use problems::rock_sample::{Posterior, Tour};
+use problems::rock_sample::{Posterior, Steps, Tour};
 use problems::vdp_tag::{self, Chase, Wander};
 use problems::{InitialState, LaserTag, LightDark, Particles, RockSample, SubHunt, VdpTag, episode};
 
@@ -97,7 +97,7 @@ where
         let decide = |belief: &ExactBelief<M::State>, _| {
             searches.time(|| match decide {
                 Decide::ExactStep(draws) => Lookahead::new(priced, draws).action(model, belief, &mut search),
-                Decide::Qmdp | Decide::Plan => known.qmdp(model, belief),
+                Decide::Qmdp | Decide::Plan | Decide::PlanAfter(_) => known.qmdp(model, belief),
             })
         };
         episode::play_with(model, start, belief, options.horizon, &mut world, decide, learn)
@@ -160,9 +160,10 @@ pub(super) fn rock_sample(options: &Options) -> impl Fn(Seed, u64) -> Played {
                 planner.prune(action, observation);
             }
             let particles = posterior.particles(&model, options.particles, &mut belief);
-            if options.decide.is_some() {
+            if let Some(decide) = options.decide {
+                let steps = if let Decide::PlanAfter(steps) = decide { steps } else { 0 };
                 // What is known is the same in all of them.
-                return searches.time(|| Tour.action(&model, &particles.states()[0], &mut search));
+                return searches.time(|| Steps(steps).action(&model, &particles.states()[0], &mut search));
             }
             searches.count(|| planner.search(&model, &particles, policy, left, &mut search))
         };

@@ -13,7 +13,7 @@ use super::table::table;
 pub const NAME: &str = "planner";
 
 /// Most bytes of a row's file.
-const MOST_BYTES: u64 = 1 << 20;
+const MOST_BYTES: u64 = 1 << 24;
 
 /// A folder of results.
 #[derive(Clone, Debug)]

@@ -49,9 +49,9 @@ enum Mode {
 /// What to do for the best where all decisions are of these kinds.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    first: Action,
+    pub(super) first: Action,
     /// Its expected return.
-    value: f64,
+    pub(super) value: f64,
 }
 
 fn toward(from: [u8; 2], to: [u8; 2]) -> f64 {
@@ -120,7 +120,7 @@ fn tour(start: [u8; 2], leaving: f64, mut left: Vec<Stop>) -> Vec<Stop> {
 
 impl RockSample {
     /// Probability that a rock is good, given what was seen of it.
-    fn chance(&self, state: &State, rock: usize) -> f64 {
+    pub(super) fn chance(&self, state: &State, rock: usize) -> f64 {
         let (seen, bit) = (&state.seen, 1_u16 << rock);
         if state.sampled & bit != 0 {
             return 0.0;
