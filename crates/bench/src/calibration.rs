@@ -17,6 +17,8 @@ use scenario::{Problem, Selection};
 use serde_json::{Value, json};
 use whole_file::Existing;
 
+use crate::worlds::Worlds;
+
 pub use episode::{Row, World};
 pub use table::table;
 
@@ -28,18 +30,12 @@ const MOST_BYTES: u64 = 1 << 24;
 /// What to run.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// Domain or scenario file.
-    pub domain: String,
-    /// Arm.
-    pub robot: Option<String>,
+    /// What worlds are drawn from.
+    pub from: Worlds,
     /// Worlds.
     pub worlds: u32,
-    /// Root seed.
-    pub seed: u64,
     /// With the budgets of `--quick`.
     pub quick: bool,
-    /// Scenario entries, key=value.
-    pub set: Vec<String>,
     /// Folder of the network; the default one where `None`.
     pub prior: Option<PathBuf>,
 }
@@ -50,22 +46,14 @@ pub struct Task {
 ///
 /// A scenario or network that does not load, a world that contradicts it, and a folder of another task.
 pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> Result<Value> {
-    let mut selection = Selection {
-        domain: task.domain.clone(),
-        preset: PRESET.into(),
-        quick: task.quick,
-        set: task.set.clone(),
-        ..Selection::new(root)
-    };
-    if let Some(robot) = &task.robot {
-        selection.robot.clone_from(robot);
-    }
+    let Task { from, worlds, quick, prior } = task;
+    let selection = Selection { quick: *quick, ..from.selection(root, PRESET) };
     let scenario = selection.load()?;
     let problem = Problem::assemble(&scenario, root)?;
-    let folder = task.prior.clone().unwrap_or_else(|| Network::default_folder(root, &problem, task.quick));
+    let folder = prior.clone().unwrap_or_else(|| Network::default_folder(root, &problem, *quick));
     let network = Network::load(&folder, &problem)?;
     let identity = json!({
-        "scenario": scenario, "seed": task.seed, "network": network.hash(),
+        "scenario": scenario, "seed": from.seed, "network": network.hash(),
     });
     let own = out.join("task.json");
     if own.exists() {
@@ -83,17 +71,17 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
             return serde_json::from_slice(&whole_file::read(&path, MOST_BYTES)?)
                 .with_context(|| format!("{} is no world of this benchmark: move it away", path.display()));
         }
-        let world = episode::play(&problem, &network, pomdp::Seed(task.seed), number)?;
+        let world = episode::play(&problem, &network, pomdp::Seed(from.seed), number)?;
         whole_file::write(&path, serde_json::to_string(&world)?.as_bytes(), Existing::Replace)?;
         note(&format!("world {number}: {} after {} actions", world.reason, world.filter.len().saturating_sub(1)));
         Ok(world)
     };
-    let worlds: Vec<World> = (0..task.worlds).into_par_iter().map(world).collect::<Result<_>>()?;
+    let worlds: Vec<World> = (0..*worlds).into_par_iter().map(world).collect::<Result<_>>()?;
     let summary = summary::summary(
         &worlds,
         &json!({
-            "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": task.seed,
-            "set": task.set, "quick": task.quick, "network": network.hash(), "commit": scenario::commit(root),
+            "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": from.seed,
+            "set": from.set, "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
         }),
     );
     whole_file::write(&out.join("calibration.json"), pretty(&summary).as_bytes(), Existing::Replace)?;

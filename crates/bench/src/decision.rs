@@ -8,24 +8,20 @@ use agent::{Agent, Episode, Error, Method, Network, SimulatedWorld, StepView, Wa
 use anyhow::{Context as _, Result};
 use pomdp::{Purpose, Seed};
 use push_task::{Action, Observation, Particle};
-use scenario::{Problem, Selection};
+use scenario::Problem;
 use serde_json::{Value, json};
+
+use crate::worlds::Worlds;
 
 /// What to run.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// Domain or scenario file.
-    pub domain: String,
-    /// Arm.
-    pub robot: String,
+    /// What worlds are drawn from.
+    pub from: Worlds,
     /// Worlds.
     pub worlds: u32,
-    /// Root seed.
-    pub seed: u64,
     /// Threads of search and update; 0 is for all cores.
     pub threads: usize,
-    /// Scenario entries, key=value.
-    pub set: Vec<String>,
 }
 
 /// What took place between two moments.
@@ -114,8 +110,8 @@ impl Watcher for Onlooker<'_> {
 ///
 /// A scenario or network that does not load, and a world that contradicts it.
 pub fn run(root: &Path, task: &Task, note: impl Fn(&str) + Sync) -> Result<Value> {
-    let (domain, robot, set) = (task.domain.clone(), task.robot.clone(), task.set.clone());
-    let mut scenario = Selection { domain, robot, set, preset: "surmise".into(), ..Selection::new(root) }.load()?;
+    let from = &task.from;
+    let mut scenario = from.selection(root, "surmise").load()?;
     let pool =
         rayon::ThreadPoolBuilder::new().num_threads(task.threads).build().context("cannot start so many threads")?;
     scenario.planner.threads = pool.current_num_threads();
@@ -123,14 +119,14 @@ pub fn run(root: &Path, task: &Task, note: impl Fn(&str) + Sync) -> Result<Value
     let network = Network::load(&Network::default_folder(root, &problem, false), &problem)?;
     let mut parts = pool.install(|| {
         (0..task.worlds).try_fold(Parts::default(), |parts, number| {
-            let seed = Seed(task.seed).child(Purpose::World, u64::from(number));
+            let seed = Seed(from.seed).child(Purpose::World, u64::from(number));
             let (parts, episode) = play(&problem, &network, seed, parts)?;
             note(&format!("world {number}: {} after {} actions", episode.reason.name(), episode.steps.len()));
             anyhow::Ok(parts)
         })
     })?;
     Ok(json!({
-        "domain": task.domain, "robot": task.robot, "worlds": task.worlds, "seed": task.seed, "set": task.set,
+        "domain": from.domain, "robot": from.robot, "worlds": task.worlds, "seed": from.seed, "set": from.set,
         "threads": scenario.planner.threads, "commit": scenario::commit(root),
         "search": figures(&mut parts.search), "update": figures(&mut parts.update),
     }))
@@ -167,7 +163,8 @@ mod tests {
     fn actions_are_counted_with_their_search_and_their_update() {
         let root = scenario::find_root(env!("CARGO_MANIFEST_DIR").as_ref()).unwrap();
         let set = ["planner.budget={ transitions = 200 }", "task.horizon=3"].map(String::from).to_vec();
-        let task = Task { domain: "D1".into(), robot: "sawyer".into(), worlds: 2, seed: 3, threads: 1, set };
+        let from = Worlds { domain: "D1".into(), robot: "sawyer".into(), seed: 3, set };
+        let task = Task { from, worlds: 2, threads: 1 };
         let found = run(&root, &task, |_| ()).unwrap();
         assert_eq!((&found["search"]["count"], &found["update"]["count"]), (&json!(6), &json!(6)), "{found}");
         let number = |part: &str, key: &str| found[part][key].as_f64().unwrap();

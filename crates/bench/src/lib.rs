@@ -31,3 +31,4 @@ pub mod policy;
 pub mod prior;
 pub mod report;
 pub mod scenes;
+pub mod worlds;

@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
+use bench::worlds::Worlds;
 use bench::{calibration, decision, log_faults, nudge, planner, policy, prior, report};
 use clap::{Parser, Subcommand};
 use scenario::Selection;
@@ -41,24 +42,14 @@ enum What {
         after_help = "Examples:\n  cargo xtask bench calibration --domain D4 --worlds 4 --quick --out runs/calibration/D4-quick"
     )]
     Calibration {
-        /// Domain: D1 to D5, or a scenario file.
-        #[arg(long, default_value = "D4")]
-        domain: String,
-        /// Arm: sawyer, jaco, or a robot file.
-        #[arg(long)]
-        robot: Option<String>,
+        #[command(flatten)]
+        from: Worlds,
         /// Worlds.
         #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(2..=100_000))]
         worlds: u32,
-        /// Root seed.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
         /// The small budgets of --quick runs.
         #[arg(long)]
         quick: bool,
-        /// Overrides a scenario entry: key=value.
-        #[arg(long = "set", value_name = "KEY=VALUE")]
-        set: Vec<String>,
         /// Folder of the network [default: the one trained here, else the shipped one].
         #[arg(long)]
         prior: Option<PathBuf>,
@@ -86,49 +77,29 @@ enum What {
     /// What the policy of the rollouts earns without a search where it knows the world, and how far its leaf values are off.
     #[command(after_help = "Examples:\n  cargo xtask bench policy --domain D4 --worlds 1000")]
     Policy {
-        /// Domain: D1 to D5, or a scenario file.
-        #[arg(long, default_value = "D4")]
-        domain: String,
-        /// Arm: sawyer, jaco, or a robot file.
-        #[arg(long, default_value = "sawyer")]
-        robot: String,
+        #[command(flatten)]
+        from: Worlds,
         /// Worlds.
         #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
         worlds: u32,
-        /// Root seed.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
         /// The obstacle is known only once it has been touched.
         #[arg(long)]
         blind: bool,
         /// Prints the steps of this world alone.
         #[arg(long, value_name = "WORLD")]
         trace: Option<u32>,
-        /// Overrides a scenario entry: key=value.
-        #[arg(long = "set", value_name = "KEY=VALUE")]
-        set: Vec<String>,
     },
     /// How long a decision takes: the search before each action, and the update of the belief after it.
     #[command(after_help = "Examples:\n  cargo xtask bench decision --domain D4 --worlds 2 --threads 2")]
     Decision {
-        /// Domain: D1 to D5, or a scenario file.
-        #[arg(long, default_value = "D4")]
-        domain: String,
-        /// Arm: sawyer, jaco, or a robot file.
-        #[arg(long, default_value = "sawyer")]
-        robot: String,
+        #[command(flatten)]
+        from: Worlds,
         /// Worlds, played one after the other.
         #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
         worlds: u32,
-        /// Root seed.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
         /// Threads of search and update [default: all cores].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
-        /// Overrides a scenario entry: key=value.
-        #[arg(long = "set", value_name = "KEY=VALUE")]
-        set: Vec<String>,
     },
     /// Speed, returns and exact values of the search on the standard problems.
     #[command(after_help = "Examples:\n  cargo xtask bench planner --quick")]
@@ -222,16 +193,8 @@ fn run(arguments: &Arguments) -> Result<()> {
                 program::show(&table(&result));
             }
         }
-        What::Calibration { domain, robot, worlds, seed, quick, set, prior, out } => {
-            let task = calibration::Task {
-                domain: domain.clone(),
-                robot: robot.clone(),
-                worlds: *worlds,
-                seed: *seed,
-                quick: *quick,
-                set: set.clone(),
-                prior: prior.clone(),
-            };
+        What::Calibration { from, worlds, quick, prior, out } => {
+            let task = calibration::Task { from: from.clone(), worlds: *worlds, quick: *quick, prior: prior.clone() };
             let summary = calibration::run(&root, &task, out, |text| program::say!("{text}"))?;
             program::show(&calibration::table(&summary));
         }
@@ -239,15 +202,13 @@ fn run(arguments: &Arguments) -> Result<()> {
             let task = nudge::Task { domain: domain.clone(), nudge_m: *nudge_m, set: set.clone() };
             program::out!("{}", serde_json::to_string_pretty(&nudge::run(&root, &task, trials)?)?);
         }
-        What::Policy { domain, robot, worlds, seed, blind, trace, set } => {
-            let (domain, robot, set) = (domain.clone(), robot.clone(), set.clone());
-            let task = policy::Task { domain, robot, worlds: *worlds, seed: *seed, blind: *blind, trace: *trace, set };
+        What::Policy { from, worlds, blind, trace } => {
+            let task = policy::Task { from: from.clone(), worlds: *worlds, blind: *blind, trace: *trace };
             program::out!("{}", policy::run(&root, &task)?);
         }
-        What::Decision { domain, robot, worlds, seed, threads, set } => {
-            let (domain, robot, set) = (domain.clone(), robot.clone(), set.clone());
+        What::Decision { from, worlds, threads } => {
             let threads = threads.map_or(0, usize::from);
-            let task = decision::Task { domain, robot, worlds: *worlds, seed: *seed, threads, set };
+            let task = decision::Task { from: from.clone(), worlds: *worlds, threads };
             let figures = decision::run(&root, &task, |text| program::say!("{text}"))?;
             program::out!("{}", serde_json::to_string_pretty(&figures)?);
         }

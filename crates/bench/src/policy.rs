@@ -9,26 +9,22 @@ use problems::episode::mean_and_error;
 use push_task::config::TaskConfig;
 use push_task::{Action, GoalPolicy, Particle, PushModel};
 use rayon::prelude::*;
-use scenario::{Problem, Selection};
+use scenario::Problem;
 use serde_json::{Value, json};
+
+use crate::worlds::Worlds;
 
 /// What to run.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// Domain or scenario file.
-    pub domain: String,
-    /// Arm.
-    pub robot: String,
+    /// What worlds are drawn from.
+    pub from: Worlds,
     /// Worlds.
     pub worlds: u32,
-    /// Root seed.
-    pub seed: u64,
     /// Whether the obstacle is known only once it has been touched.
     pub blind: bool,
     /// Only this world, step by step.
     pub trace: Option<u32>,
-    /// Scenario entries, key=value.
-    pub set: Vec<String>,
 }
 
 /// Actions of an episode from which delays are fitted: later ones are mostly of episodes that are lost.
@@ -59,10 +55,9 @@ struct Played {
 ///
 /// A scenario that does not load, and a distribution without a possible world.
 pub fn run(root: &Path, task: &Task) -> Result<Value> {
-    let (domain, robot, set) = (task.domain.clone(), task.robot.clone(), task.set.clone());
-    let selection = Selection { domain, robot, set, ..Selection::new(root) };
-    let problem = Problem::assemble(&selection.load()?, root)?;
-    let play = |world: u32| play(&problem, task, Seed(task.seed).child(Purpose::World, u64::from(world)));
+    let from = &task.from;
+    let problem = Problem::assemble(&from.selection(root, "paper").load()?, root)?;
+    let play = |world: u32| play(&problem, task, Seed(from.seed).child(Purpose::World, u64::from(world)));
     if let Some(world) = task.trace {
         return Ok(json!(play(world)?.steps));
     }
@@ -71,7 +66,7 @@ pub fn run(root: &Path, task: &Task) -> Result<Value> {
     let (mean_return, standard_error) = mean_and_error(&each(&|world| world.discounted_return));
     let unsolved: Vec<usize> = (0..played.len()).filter(|&world| !played[world].solved).collect();
     Ok(json!({
-        "domain": task.domain, "robot": task.robot, "seed": task.seed, "worlds": played.len(), "blind": task.blind, "set": task.set,
+        "domain": from.domain, "robot": from.robot, "seed": from.seed, "worlds": played.len(), "blind": task.blind, "set": from.set,
         "commit": scenario::commit(root),
         "solved": played.len() - unsolved.len(),
         "return": mean_return, "standard_error": standard_error,
@@ -164,7 +159,8 @@ mod tests {
     use super::*;
 
     fn task(blind: bool, trace: Option<u32>) -> Task {
-        Task { domain: "D4".into(), robot: "sawyer".into(), worlds: 40, seed: 1, blind, trace, set: Vec::new() }
+        let from = Worlds { domain: "D4".into(), robot: "sawyer".into(), seed: 1, set: Vec::new() };
+        Task { from, worlds: 40, blind, trace }
     }
 
     fn root() -> std::path::PathBuf {
@@ -191,7 +187,7 @@ mod tests {
 
     #[test]
     fn delays_are_found_again() {
-        let problem = Problem::assemble(&Selection::new(root()).load().unwrap(), &root()).unwrap();
+        let problem = Problem::assemble(&scenario::Selection::new(root()).load().unwrap(), &root()).unwrap();
         let task = &problem.truth.config().task;
         // The goal with the first action pays its reward, less one action.
         assert_eq!(GoalPolicy::worth(task, 1.0, true), task.reward.step + task.reward.goal);
