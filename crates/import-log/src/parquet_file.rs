@@ -17,7 +17,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use crate::Error;
 use crate::mapping::Mapping;
 use crate::plan::Plan;
-use crate::rows::{ElementNames, Extractor, Place};
+use crate::rows::{Columns, ElementNames, Extractor, Place};
 use crate::store::Store;
 use crate::value::Value;
 
@@ -63,7 +63,9 @@ fn read_trusting(
 ) -> Result<(), Error> {
     let builder = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| broken(path, &e))?;
     let names: Vec<String> = builder.schema().fields().iter().map(|field| field.name().clone()).collect();
-    let mut extractor = Extractor::new(mapping, plan, path, names, elements)?;
+    let single = |kind: &DataType| !kind.is_nested() && *kind != DataType::Null;
+    let lists = builder.schema().fields().iter().map(|field| !single(field.data_type())).collect();
+    let mut extractor = Extractor::new(mapping, plan, path, Columns { names, elements, lists })?;
     let used = extractor.columns();
     for column in &used {
         let field = &builder.schema().fields()[*column];

@@ -13,6 +13,38 @@ use crate::value::Value;
 /// Names of the elements of columns that hold lists.
 pub(crate) type ElementNames = BTreeMap<String, Vec<String>>;
 
+/// Columns of a table, and what is known of the lists in them.
+pub(crate) struct Columns<'a> {
+    pub(crate) names: Vec<String>,
+    pub(crate) elements: &'a ElementNames,
+    /// Which columns may hold lists.
+    pub(crate) lists: Vec<bool>,
+}
+
+impl Columns<'_> {
+    /// Names of the elements of a column, where they are known.
+    fn elements_of(&self, column: usize) -> Option<&Vec<String>> {
+        self.elements.get(&self.names[column]).filter(|elements| !elements.is_empty())
+    }
+
+    /// Checks that the place of a vector of `count` numbers holds as many.
+    fn check_vector(&self, place: Place, text: &str, count: usize) -> Result<(), String> {
+        let found = if place.element.is_some() {
+            "one element of it"
+        } else if !self.lists[place.column] {
+            "a column of single numbers"
+        } else {
+            return match self.elements_of(place.column).map(Vec::len) {
+                Some(length) if length != count => {
+                    Err(format!("expected a list of {count} in {}, found one of {length}", excerpt(text)))
+                }
+                _ => Ok(()),
+            };
+        };
+        Err(format!("expected a list of {count} in {}, or a list of columns here, found {found}", excerpt(text)))
+    }
+}
+
 /// A column, or an element of the lists in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
@@ -39,16 +71,10 @@ pub(crate) struct Extractor<'a> {
 
 impl<'a> Extractor<'a> {
     /// Looks up the columns of a plan among `names`.
-    pub(crate) fn new(
-        mapping: &Mapping,
-        plan: &'a Plan,
-        path: &'a Path,
-        names: Vec<String>,
-        elements: &ElementNames,
-    ) -> Result<Self, Error> {
+    pub(crate) fn new(mapping: &Mapping, plan: &'a Plan, path: &'a Path, columns: Columns<'_>) -> Result<Self, Error> {
         let find = |key: &str, text: &str| {
-            place(&names, elements, text).ok_or_else(|| {
-                let some = names.iter().map(|name| excerpt(name)).take(40).collect::<Vec<_>>().join(", ");
+            place(&columns, text).ok_or_else(|| {
+                let some = columns.names.iter().map(|name| excerpt(name)).take(40).collect::<Vec<_>>().join(", ");
                 let reason = format!("expected a column of {} ({some}), found {}", path.display(), excerpt(text));
                 mapping.wrong(key, reason)
             })
@@ -63,6 +89,13 @@ impl<'a> Extractor<'a> {
                     Pick::Value { path, part: Part::All } => Source::Cell(find(key, path)?),
                     Pick::Value { path, part: Part::Of(element, _) } => {
                         let place = find(key, path)?;
+                        let same = |pick: &&Pick| matches!(pick, Pick::Value { path: other, part: Part::Of(..) } if other == path);
+                        let count = track.picks.iter().filter(same).count();
+                        // One number is a list of one.
+                        if count > 1 {
+                            let check = columns.check_vector(place, path, count);
+                            check.map_err(|reason| mapping.wrong(key, reason))?;
+                        }
                         Source::Cell(Place { column: place.column, element: place.element.or(*element) })
                     }
                     Pick::Value { .. } => {
@@ -76,7 +109,7 @@ impl<'a> Extractor<'a> {
             };
             tracks.push((sources, find("clock.stamp", column)?));
         }
-        Ok(Self { plan, path, names, tracks, row: 0, picked: Vec::new() })
+        Ok(Self { plan, path, names: columns.names, tracks, row: 0, picked: Vec::new() })
     }
 
     /// The columns that are asked for.
@@ -169,14 +202,18 @@ pub(crate) fn too_large(path: &Path, limit: usize) -> Error {
 }
 
 /// The column that a text names: as it stands, or `name[2]`, or `name[element]`.
-pub(crate) fn place(names: &[String], elements: &ElementNames, text: &str) -> Option<Place> {
-    if let Some(column) = names.iter().position(|name| name == text) {
+pub(crate) fn place(columns: &Columns<'_>, text: &str) -> Option<Place> {
+    let column_of = |name: &str| columns.names.iter().position(|other| other == name);
+    if let Some(column) = column_of(text) {
         return Some(Place { column, element: None });
     }
     let (name, element) = text.strip_suffix(']')?.split_once('[')?;
-    let column = names.iter().position(|other| other == name)?;
-    let named = || elements.get(name)?.iter().position(|other| other == element);
-    Some(Place { column, element: Some(element.parse().ok().or_else(named)?) })
+    let column = column_of(name).filter(|column| columns.lists[*column])?;
+    let elements = columns.elements_of(column);
+    let named = || elements?.iter().position(|other| other == element);
+    let element = element.parse().ok().or_else(named)?;
+    let there = elements.is_none_or(|elements| element < elements.len());
+    there.then_some(Place { column, element: Some(element) })
 }
 
 /// A time of a clock whose unit is `unit_secs`. Whole numbers stay exact: nanoseconds since 1970 have more digits than a float.
@@ -201,15 +238,31 @@ mod tests {
 
     #[test]
     fn columns_are_found_by_name_by_place_and_by_the_name_of_an_element() {
-        let names = ["t", "observation.state", "a[0]"].map(String::from);
+        let names = ["t", "observation.state", "a[0]"].map(String::from).to_vec();
         let elements = ElementNames::from([("observation.state".into(), vec!["x.pos".into(), "y.pos".into()])]);
-        let find = |text| place(&names, &elements, text).map(|place| (place.column, place.element));
+        let columns = Columns { names, elements: &elements, lists: vec![false, true, false] };
+        let find = |text| place(&columns, text).map(|place| (place.column, place.element));
         assert_eq!(find("t"), Some((0, None)));
         assert_eq!(find("a[0]"), Some((2, None)), "a name with brackets");
         assert_eq!(find("observation.state[1]"), Some((1, Some(1))));
         assert_eq!(find("observation.state[y.pos]"), Some((1, Some(1))));
         assert_eq!(find("observation.state[z.pos]"), None);
         assert_eq!(find("observation.stat"), None);
+        assert_eq!((find("observation.state[2]"), find("t[0]")), (None, None), "there are two, and none");
+    }
+
+    #[test]
+    fn a_vector_wants_a_list_of_its_length() {
+        let elements = ElementNames::from([("pair".into(), vec!["x".into(), "y".into()])]);
+        let names = ["t", "pair", "unnamed"].map(String::from).to_vec();
+        let columns = Columns { names, elements: &elements, lists: vec![false, true, true] };
+        let check = |text: &str, count| columns.check_vector(place(&columns, text).unwrap(), text, count);
+        assert_eq!((check("pair", 2), check("unnamed", 3)), (Ok(()), Ok(())));
+        assert_eq!(check("pair", 3).unwrap_err(), "expected a list of 3 in `pair`, found one of 2");
+        for (text, found) in [("t", "a column of single numbers"), ("pair[0]", "one element of it")] {
+            let message = check(text, 2).unwrap_err();
+            assert!(message.ends_with(&format!("or a list of columns here, found {found}")), "{message}");
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::error::{excerpt, open};
 use crate::mapping::Mapping;
 use crate::parquet_file;
 use crate::plan::Plan;
-use crate::rows::{ElementNames, Extractor, Place};
+use crate::rows::{Columns, ElementNames, Extractor, Place};
 use crate::store::Store;
 use crate::value::Value;
 
@@ -39,7 +39,9 @@ pub(crate) fn read(mapping: &Mapping, plan: &Plan, path: &Path, store: &mut Stor
             return Err(mapping.wrong("table.decimal", format!("expected \".\" or \",\", found {found}")));
         }
     };
-    let mut extractor = Extractor::new(mapping, plan, path, csv.names.clone(), &ElementNames::new())?;
+    let (names, elements) = (csv.names.clone(), ElementNames::new());
+    let columns = Columns { lists: vec![false; names.len()], names, elements: &elements };
+    let mut extractor = Extractor::new(mapping, plan, path, columns)?;
     while csv.next()? {
         let record = &csv.record;
         extractor.row(store, &|place: Place| text_cell(record.get(place.column), decimal))?;

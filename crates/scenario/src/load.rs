@@ -67,7 +67,8 @@ impl Selection {
             let (name, table) = (path.display().to_string(), read(&path)?);
             // Of a file that is no arm, whatever else it says would be missed in others.
             if kind == LayerKind::Robot && !table.get("robot").is_some_and(Value::is_table) {
-                return Err(Error::Key { file: name, key: "robot".into(), message: "`robot` is missing".into() });
+                let message = "expected the table [robot] of an arm, as in scenarios/robots/sawyer.toml".into();
+                return Err(Error::Key { file: name, key: "robot".into(), message });
             }
             layers.push(kind, name, table);
         }

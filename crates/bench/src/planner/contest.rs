@@ -182,7 +182,9 @@ impl Row {
             }
             (Some(Decide::ExactStep(draws)), _) if *draws == 0 => bail!("exact_step is 0: a step needs an observation"),
             (Some(Decide::Qmdp | Decide::ExactStep(_)), Problem::LightDark | Problem::LaserTag | Problem::SubHunt) => {}
-            (Some(decide), _) => bail!("decide cannot be {decide:?} here"),
+            (Some(_), Problem::RockSample) => bail!("decide: expected \"plan\" or {{ plan_after = 2 }}"),
+            (Some(_), Problem::VdpTag) => bail!("decide: expected none, only its search decides here"),
+            (Some(_), _) => bail!("decide: expected \"qmdp\" or {{ exact_step = 100 }}"),
         }
         ensure!(*horizon > 0, "horizon is 0: an episode needs an action");
         let exact = !matches!(self.problem, Problem::VdpTag | Problem::RockSample);
@@ -300,9 +302,9 @@ mod tests {
         assert!(refused(&[], &["vdp_tag.planner.observations=\"classes\""]).contains("must be widening"));
         assert!(refused(&[], &["light_dark.planner.depth=0"]).contains("depth"));
         assert!(refused(&[], &["laser_tag.price_of_uncertainty=-1.0"]).contains("expected 0 or more"));
-        assert!(refused(&[], &["laser_tag.decide=\"plan\""]).contains("decide cannot be Plan here"));
+        assert!(refused(&[], &["laser_tag.decide=\"plan\""]).contains("decide: expected \"qmdp\" or { exact_step"));
         assert!(refused(&[], &["laser_tag.decide={ exact_step = 0 }"]).contains("needs an observation"));
-        assert!(refused(&[], &["vdp_tag.decide=\"qmdp\""]).contains("decide cannot be Qmdp here"));
+        assert!(refused(&[], &["vdp_tag.decide=\"qmdp\""]).contains("decide: expected none"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use serde_json::{Map, Value, json};
 use whole_file::Existing;
 
@@ -37,11 +37,11 @@ impl Results {
         self.folder.join(format!("{name}.json"))
     }
 
-    /// What the folder has of a row with the same task.
+    /// What the folder has of a row.
     ///
     /// # Errors
     ///
-    /// A file that is no result of this command.
+    /// A file that is no result of this command, and a row of another task.
     pub(super) fn of(&self, row: &Row) -> Result<Option<Value>> {
         let path = self.path(row.name());
         if !path.exists() {
@@ -50,10 +50,12 @@ impl Results {
         let bytes = whole_file::read(&path, MOST_BYTES)?;
         let value: Value = serde_json::from_slice(&bytes)
             .with_context(|| format!("{} is no result of this benchmark: move it away", path.display()))?;
-        Ok((value["task"] == row.task()).then_some(value))
+        let same = value["task"] == row.task();
+        ensure!(same, "{} has a row of other options, episodes or seed: choose another folder", path.display());
+        Ok(Some(value))
     }
 
-    /// Writes a row, in place of what was there for another task.
+    /// Writes a row.
     ///
     /// # Errors
     ///
