@@ -190,6 +190,10 @@ impl<'a> Builder<'a> {
         let unit = self.factor(key("unit"), dimension, raw.unit.as_deref())?;
         let picks: Vec<Pick> = match (&raw.values, &raw.names, &raw.order) {
             (Vector::Whole(path), Some(_), Some(order)) => {
+                if let Some(twice) = order.iter().enumerate().find(|(i, name)| order[..*i].contains(name)) {
+                    let reason = format!("expected different joints, found {} twice", crate::error::excerpt(twice.1));
+                    return Err(self.mapping.wrong(key("order"), reason));
+                }
                 let named = |name: &String| Pick::Value { path: path.clone(), part: Part::Named(name.clone()) };
                 order.iter().map(named).collect()
             }

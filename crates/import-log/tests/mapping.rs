@@ -155,6 +155,18 @@ fn each_mistake_in_a_mapping_is_named_with_its_key() {
 }
 
 #[test]
+fn a_vector_of_one_column_and_a_joint_given_twice_are_refused() {
+    let message = imported(HEAD, "[object]\nposition = \"x\"\n", TABLE).unwrap_err();
+    let expected =
+        "key `object`: expected a list of 3 in `x`, or a list of columns here, found a column of single numbers";
+    assert!(message.ends_with(expected), "{message}");
+    let text = std::fs::read_to_string(data().join("joints.toml")).unwrap();
+    let mapping = Mapping::parse(Path::new("map.toml"), &text.replacen("\"j5\"]", "\"j4\"]", 1)).unwrap();
+    let message = Source::Ros2.import(&[data().join("ros2_mcap")], &mapping).unwrap_err().to_string();
+    assert_eq!(message, "map.toml, key `joints.order`: expected different joints, found `j4` twice");
+}
+
+#[test]
 fn topics_and_paths_that_are_not_there_are_named_with_what_is() {
     let text = std::fs::read_to_string(data().join("ros2_mcap.toml")).unwrap();
     for (from, to, expected) in [

@@ -140,6 +140,11 @@ fn read(path: &Path) -> Result<Table, Error> {
     let syntax = |message: &str| Error::Syntax { file: path.to_path_buf(), message: one_line(message, SENTENCE) };
     let text = std::str::from_utf8(&bytes)
         .map_err(|e| syntax(&format!("expected UTF-8 text, found another byte at {}", e.valid_up_to())))?;
+    if text.trim_start().starts_with('<') {
+        return Err(syntax(
+            "expected keys and values, found XML; a URDF file is named in the [robot] table of a TOML file",
+        ));
+    }
     // The version alone comes first, so that an old file says so instead of listing unknown keys.
     let head: Head = toml::from_str(text).map_err(|e| syntax(&toml_problem(text, &e)))?;
     if let Some(found) = head.version
@@ -249,6 +254,13 @@ mod tests {
         let again = load(|s| s.domain = file.display().to_string());
         std::fs::remove_file(&file).unwrap();
         assert_eq!(again.unwrap(), scenario);
+    }
+
+    #[test]
+    fn an_arms_urdf_is_no_robot_file() {
+        let file = root().join("assets/robots/jaco.urdf").display().to_string();
+        let message = load(|s| s.robot.clone_from(&file)).unwrap_err().to_string();
+        assert!(message.starts_with(&file) && message.contains("found XML; a URDF file is named in"), "{message}");
     }
 
     #[test]
