@@ -208,11 +208,12 @@ pub(crate) fn place(columns: &Columns<'_>, text: &str) -> Option<Place> {
         return Some(Place { column, element: None });
     }
     let (name, element) = text.strip_suffix(']')?.split_once('[')?;
-    let column = column_of(name).filter(|column| columns.lists[*column])?;
+    let column = column_of(name)?;
     let elements = columns.elements_of(column);
     let named = || elements?.iter().position(|other| other == element);
     let element = element.parse().ok().or_else(named)?;
-    let there = elements.is_none_or(|elements| element < elements.len());
+    // Some writers keep a list of one as a number.
+    let there = if columns.lists[column] { elements.is_none_or(|all| element < all.len()) } else { element == 0 };
     there.then_some(Place { column, element: Some(element) })
 }
 
@@ -248,7 +249,8 @@ mod tests {
         assert_eq!(find("observation.state[y.pos]"), Some((1, Some(1))));
         assert_eq!(find("observation.state[z.pos]"), None);
         assert_eq!(find("observation.stat"), None);
-        assert_eq!((find("observation.state[2]"), find("t[0]")), (None, None), "there are two, and none");
+        assert_eq!((find("observation.state[2]"), find("t[1]")), (None, None), "there are two, and one");
+        assert_eq!(find("t[0]"), Some((0, Some(0))));
     }
 
     #[test]
