@@ -25,6 +25,7 @@ pub(crate) fn episodes(
         store.sort();
     }
     let pieces = cut(mapping, plan, &store, keep_rows)?;
+    check_clocks(mapping, plan, &store, pieces.len())?;
     let ids = ids(&pieces, episodes.len() as u64);
     let mut rows: usize = episodes.iter().map(Episode::rows).sum();
     for (piece, id) in pieces.iter().zip(ids) {
@@ -49,6 +50,22 @@ pub(crate) fn episodes(
             })?;
         }
         episodes.push(episode);
+    }
+    Ok(())
+}
+
+/// Refuses a clock that stands still: of each episode one reading would be left.
+fn check_clocks(mapping: &Mapping, plan: &Plan, store: &Store, episodes: usize) -> Result<(), Error> {
+    for (track, stream) in plan.tracks.iter().zip(&store.streams) {
+        // These hold until they change.
+        let lasts = matches!(track.quantity, Quantity::AddedMass | Quantity::Action | Quantity::Label);
+        let times = stream.times.len();
+        if !lasts && stream.replaced > 0 && times <= episodes.max(1) {
+            let found = times + stream.replaced;
+            let reason =
+                format!("expected a clock that goes on, found {times} times in {found} readings; log is another");
+            return Err(mapping.wrong(format!("{}.stamp", track.quantity.key()), reason));
+        }
     }
     Ok(())
 }

@@ -36,7 +36,8 @@ pub(crate) trait Sink {
 
 enum Source {
     Constant(f64),
-    Value(Path, Part),
+    /// With how many numbers come from the same place.
+    Value(Path, Part, usize),
 }
 
 struct Compiled {
@@ -81,7 +82,10 @@ impl<'a> Extractor<'a> {
             let source = |pick: &Pick| {
                 Ok(match pick {
                     Pick::Constant(value) => Source::Constant(*value),
-                    Pick::Value { path: text, part } => Source::Value(path(key.to_string(), text)?, part.clone()),
+                    Pick::Value { path: text, part } => {
+                        let count = track.elements_of(text);
+                        Source::Value(path(key.to_string(), text)?, part.clone(), count)
+                    }
                 })
             };
             let stamp = match &track.stamp {
@@ -138,8 +142,14 @@ impl<'a> Extractor<'a> {
         for source in &compiled.sources {
             picked.push(match source {
                 Source::Constant(value) => *value,
-                Source::Value(path, part) => {
+                Source::Value(path, part, count) => {
                     let at = path.follow(value);
+                    if let (Part::Of(..), Some(Value::List(list))) = (part, at)
+                        && list.len() > *count
+                    {
+                        let reason = longer(&track.picks[picked.len()], *count, list.len());
+                        return Err(self.mapping.wrong(track.quantity.key(), reason));
+                    }
                     let found = match part {
                         Part::All => at,
                         Part::Of(place, name) => at.and_then(|at| at.part(place.unwrap_or(usize::MAX), name)),
@@ -231,6 +241,15 @@ fn not_there(track: &Track, compiled: &Compiled) -> String {
         if fields.is_empty() { "others".into() } else { fields.join(", ") },
         compiled.messages,
         if unordered { " (a quaternion that is a list needs its order)" } else { "" }
+    )
+}
+
+/// Of a list some numbers would be taken and others left, by their order alone.
+fn longer(pick: &Pick, count: usize, found: usize) -> String {
+    let path = if let Pick::Value { path, .. } = pick { path.as_str() } else { "" };
+    format!(
+        "expected a list of {count} at {}, found one of {found} (elements are named one by one, as in [\"{path}[0]\", …])",
+        excerpt(path)
     )
 }
 

@@ -104,6 +104,12 @@ impl Track {
         }
     }
 
+    /// Numbers that are taken from the list or message at `path` by their order.
+    pub(crate) fn elements_of(&self, path: &str) -> usize {
+        let same = |pick: &&Pick| matches!(pick, Pick::Value { path: other, part: Part::Of(..) } if other == path);
+        self.picks.iter().filter(same).count()
+    }
+
     /// Numbers that are kept.
     pub(crate) fn width(&self) -> usize {
         self.picks.len() + usize::from(self.angles)

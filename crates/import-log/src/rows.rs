@@ -65,6 +65,8 @@ pub(crate) struct Extractor<'a> {
     names: Vec<String>,
     /// Of each track, its numbers and its stamp.
     tracks: Vec<(Vec<Source>, Place)>,
+    /// What stands behind the end of each vector that is a list; its length.
+    beyond: Vec<Place>,
     row: u64,
     picked: Vec<f64>,
 }
@@ -79,7 +81,7 @@ impl<'a> Extractor<'a> {
                 mapping.wrong(key, reason)
             })
         };
-        let mut tracks = Vec::new();
+        let (mut tracks, mut beyond) = (Vec::new(), Vec::new());
         for track in &plan.tracks {
             let key = track.quantity.key();
             let mut sources = Vec::new();
@@ -89,12 +91,15 @@ impl<'a> Extractor<'a> {
                     Pick::Value { path, part: Part::All } => Source::Cell(find(key, path)?),
                     Pick::Value { path, part: Part::Of(element, _) } => {
                         let place = find(key, path)?;
-                        let same = |pick: &&Pick| matches!(pick, Pick::Value { path: other, part: Part::Of(..) } if other == path);
-                        let count = track.picks.iter().filter(same).count();
+                        let count = track.elements_of(path);
                         // One number is a list of one.
                         if count > 1 {
                             let check = columns.check_vector(place, path, count);
                             check.map_err(|reason| mapping.wrong(key, reason))?;
+                            let end = Place { element: Some(count), ..place };
+                            if !beyond.contains(&end) {
+                                beyond.push(end);
+                            }
                         }
                         Source::Cell(Place { column: place.column, element: place.element.or(*element) })
                     }
@@ -109,7 +114,7 @@ impl<'a> Extractor<'a> {
             };
             tracks.push((sources, find("clock.stamp", column)?));
         }
-        Ok(Self { plan, path, names: columns.names, tracks, row: 0, picked: Vec::new() })
+        Ok(Self { plan, path, names: columns.names, tracks, beyond, row: 0, picked: Vec::new() })
     }
 
     /// The columns that are asked for.
@@ -127,6 +132,12 @@ impl<'a> Extractor<'a> {
     /// Takes the readings of a row, whose cells `cell` gives.
     pub(crate) fn row(&mut self, store: &mut Store, cell: &dyn Fn(Place) -> Value) -> Result<(), Error> {
         self.row += 1;
+        if let Some(place) = self.beyond.iter().find(|place| !matches!(cell(**place), Value::Missing)) {
+            let (count, name) = (place.element.unwrap_or_default(), &self.names[place.column]);
+            let where_ = format!("row {}, column {}", self.row, excerpt(name));
+            let found = format!("a longer one (elements are named one by one, as in [\"{name}[0]\", …])");
+            return Err(Error::source(self.path, where_, &format!("a list of {count}"), found));
+        }
         let keep_rows = self.plan.sample == Sampling::Rows;
         let shift = if keep_rows { 0.0 } else { self.shift(store, cell) };
         for (index, (track, (sources, stamp))) in self.plan.tracks.iter().zip(&self.tracks).enumerate() {
@@ -264,6 +275,34 @@ mod tests {
         for (text, found) in [("t", "a column of single numbers"), ("pair[0]", "one element of it")] {
             let message = check(text, 2).unwrap_err();
             assert!(message.ends_with(&format!("or a list of columns here, found {found}")), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_list_that_is_longer_than_its_vector_is_refused() {
+        let header = "robot = \"none\"\nperiod_secs = 0.1\ngravity_mps2 = 9.81\ntable = { height_m = 0.0, friction = 0.4 }\n\
+                      object = { shape = \"sphere\", size_m = [0.03], mass_kg = 0.2, com_m = [0.0, 0.0, 0.0] }\n\
+                      split = { holdout_fraction = 0.5 }";
+        let text = format!(
+            "version = 1\nclock = {{ stamp = \"t\" }}\nepisodes = \"source\"\n[log]\n{header}\n[object]\nposition = \"xyz\"\n"
+        );
+        let mapping = Mapping::parse(Path::new("map.toml"), &text).unwrap();
+        let plan = crate::plan::resolve(&mapping, crate::plan::Kind::Table, None).unwrap();
+        let elements = ElementNames::new();
+        for (length, expected) in
+            [(3, None), (4, Some("rig.parquet, row 1, column `xyz`: expected a list of 3, found a longer one"))]
+        {
+            let names = ["t", "xyz"].map(String::from).to_vec();
+            let columns = Columns { names, elements: &elements, lists: vec![false, true] };
+            let mut extractor = Extractor::new(&mapping, &plan, Path::new("rig.parquet"), columns).unwrap();
+            let cell = |place: Place| match place.element {
+                Some(element) if element >= length => Value::Missing,
+                _ => Value::Number(0.5),
+            };
+            let result = extractor.row(&mut Store::new(&plan, 0.1), &cell).map_err(|error| error.to_string());
+            let message = result.err();
+            assert_eq!(message.is_some(), expected.is_some(), "{message:?}");
+            assert!(message.unwrap_or_default().starts_with(expected.unwrap_or_default()));
         }
     }
 

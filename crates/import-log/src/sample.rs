@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     fn at(how: Sampling, time: f64) -> Vec<f64> {
-        let stream = Stream { width: 1, times: vec![0.0, 1.0, 5.0], values: vec![10.0, 20.0, 60.0] };
+        let stream = Stream { width: 1, times: vec![0.0, 1.0, 5.0], values: vec![10.0, 20.0, 60.0], replaced: 0 };
         let mut out = [0.0];
         Sampler { how, near_secs: 1.0, rotation: None }.at(&stream, time, &mut out);
         out.to_vec()
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn a_missing_component_stays_missing_and_alone() {
-        let stream = Stream { width: 2, times: vec![0.0, 1.0], values: vec![1.0, f64::NAN, 3.0, 4.0] };
+        let stream = Stream { width: 2, times: vec![0.0, 1.0], values: vec![1.0, f64::NAN, 3.0, 4.0], replaced: 0 };
         let mut out = [0.0; 2];
         Sampler { how: Sampling::Linear, near_secs: 1.0, rotation: None }.at(&stream, 0.5, &mut out);
         assert!(out[0] == 2.0 && out[1].is_nan());

@@ -21,6 +21,8 @@ pub(crate) struct Stream {
     pub(crate) times: Vec<f64>,
     /// `width` numbers a reading; NaN is a missing one.
     pub(crate) values: Vec<f64>,
+    /// Readings that another one of the same time has replaced.
+    pub(crate) replaced: usize,
 }
 
 impl Stream {
@@ -39,6 +41,7 @@ impl Stream {
         for index in order {
             if self.times.last() == Some(&times[index]) {
                 self.times.pop();
+                self.replaced += 1;
                 self.values.truncate(self.values.len() - self.width);
             }
             self.times.push(times[index]);
@@ -96,7 +99,7 @@ pub(crate) struct Full {
 
 impl Store {
     pub(crate) fn new(plan: &Plan, period_secs: f64) -> Self {
-        let stream = |width| Stream { width, times: Vec::new(), values: Vec::new() };
+        let stream = |width| Stream { width, times: Vec::new(), values: Vec::new(), replaced: 0 };
         let rows = plan.sample == Sampling::Rows;
         Self {
             streams: plan.tracks.iter().map(|track| stream(track.width())).collect(),
@@ -188,14 +191,16 @@ mod tests {
 
     #[test]
     fn the_last_reading_of_a_moment_counts() {
-        let mut stream = Stream { width: 1, times: vec![1.0, 0.0, 1.0, 0.5], values: vec![10.0, 0.0, 11.0, 5.0] };
+        let mut stream =
+            Stream { width: 1, times: vec![1.0, 0.0, 1.0, 0.5], values: vec![10.0, 0.0, 11.0, 5.0], replaced: 0 };
         stream.sort();
         assert_eq!((stream.times, stream.values), (vec![0.0, 0.5, 1.0], vec![0.0, 5.0, 11.0]));
     }
 
     #[test]
     fn thinning_keeps_the_first_of_each_gap() {
-        let mut stream = Stream { width: 1, times: vec![0.0, 0.1, 0.2, 0.3], values: vec![0.0, 1.0, 2.0, 3.0] };
+        let mut stream =
+            Stream { width: 1, times: vec![0.0, 0.1, 0.2, 0.3], values: vec![0.0, 1.0, 2.0, 3.0], replaced: 0 };
         stream.thin(0.15);
         assert_eq!((stream.times, stream.values), (vec![0.0, 0.2], vec![0.0, 2.0]));
     }

@@ -167,6 +167,29 @@ fn a_vector_of_one_column_and_a_joint_given_twice_are_refused() {
 }
 
 #[test]
+fn of_a_longer_list_nothing_is_taken_by_its_order() {
+    let text = std::fs::read_to_string(data().join("own_message.toml")).unwrap();
+    let longer = text.replacen("\"tool_cm\"", "\"box.wxyz\"", 1);
+    assert_ne!(text, longer);
+    let mapping = Mapping::parse(Path::new("map.toml"), &longer).unwrap();
+    let message = Source::Mcap.import(&[data().join("own_message.mcap")], &mapping).unwrap_err().to_string();
+    let expected = "expected a list of 3 at `box.wxyz`, found one of 4 (elements are named one by one, as in [\"box.wxyz[0]\", …])";
+    assert_eq!(message, format!("map.toml, key `tool`: {expected}"));
+}
+
+#[test]
+fn a_clock_that_stands_still_is_refused() {
+    let text = std::fs::read_to_string(data().join("json.toml")).unwrap();
+    // The weight is the same all through an episode.
+    let lines =
+        text.lines().map(|line| if line.starts_with("clock") { "clock = { stamp = \"weight_g\" }" } else { line });
+    let mapping = Mapping::parse(Path::new("map.toml"), &lines.collect::<Vec<_>>().join("\n")).unwrap();
+    let message = Source::Mcap.import(&[data().join("json.mcap")], &mapping).unwrap_err().to_string();
+    let expected = "key `command.stamp`: expected a clock that goes on, found 2 times in ";
+    assert!(message.contains(expected), "{message}");
+}
+
+#[test]
 fn topics_and_paths_that_are_not_there_are_named_with_what_is() {
     let text = std::fs::read_to_string(data().join("ros2_mcap.toml")).unwrap();
     for (from, to, expected) in [
