@@ -22,15 +22,18 @@ import numpy as np
 
 import engines
 import hidden
+import scene as wide
 import sensors
+import usual
 from plan import draw_plan
-from scene import GRAVITY, draw_rig, draw_scene
+from scene import GRAVITY
 from world import World
 
 SHARES = {"none": 0.4, "one": 0.45, "pair": 0.05, "outside": 0.1}
 LEAST_DETECTABLE = 0.15  # mean square, standard deviations
 PROBED, COMPARED = 3, 8  # episodes
 MOST_ROWS = 12000
+DRAWS = {"wide": wide, "usual": usual}
 
 
 class Faint(Exception):
@@ -72,19 +75,19 @@ def stream(seed, index, engine, retry=0):
     return np.random.default_rng([seed, index, zlib.crc32(engine.encode()), retry])
 
 
-def draw_log(seed, index, engine, variant):
+def draw_log(seed, index, engine, variant, draws=wide):
     """Scene, rig, plan, effects, their traces and how well they can be seen. Of another scene, where nothing shows in the first."""
     for retry in range(10):
         try:
-            return try_log(stream(seed, index, engine, retry), engine, variant)
+            return try_log(stream(seed, index, engine, retry), engine, variant, draws=draws)
         except Faint:
             continue
     raise Faint(f"log {index}: nothing shows in ten scenes")
 
 
-def try_log(rng, engine, variant, simulate=simulate):
-    scene = draw_scene(rng, engines.unsuitable(engine))
-    rig = draw_rig(rng, scene)
+def try_log(rng, engine, variant, simulate=simulate, draws=wide):
+    scene = draws.draw_scene(rng, engines.unsuitable(engine))
+    rig = draws.draw_rig(rng, scene)
     kind = str(rng.choice(list(SHARES), p=list(SHARES.values())))
     unsupported = engines.unsupported(engine)
     for attempt in range(12):
@@ -190,8 +193,9 @@ def make(options, index):
     began = time.perf_counter()
     variants = engines.ENGINES[options.engine]
     variant = variants[index % len(variants)] if options.variant == "all" else options.variant
-    rng, scene, rig, kind, effects, plan, stamps, traces, seen, each = draw_log(options.seed, index, options.engine, variant)
-    folder = options.out / f"{options.engine}-{options.variant}-seed{options.seed}"
+    rng, scene, rig, kind, effects, plan, stamps, traces, seen, each = draw_log(options.seed, index, options.engine, variant, DRAWS[options.draws])
+    of = "" if options.draws == "wide" else f"-{options.draws}"
+    folder = options.out / f"{options.engine}-{options.variant}{of}-seed{options.seed}"
     name = f"log-{index:03d}"
     weighed = rig.designed and not rig.tosses
     columns = ["episode", "time_secs", *(c for g in sensors.groups(rig) for c in sensors.GROUPS[g])] + (["added_mass_kg"] if weighed else [])
@@ -220,6 +224,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--engine", choices=sorted(engines.ENGINES), required=True)
     parser.add_argument("--variant", default="all", help="one of the engine's, or all in turn")
+    parser.add_argument("--draws", choices=list(DRAWS), default="wide", help="objects and rigs of all kinds, or as most laboratories have them")
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--logs", type=int, default=30)
     parser.add_argument("--first", type=int, default=0, help="number of the first log")
