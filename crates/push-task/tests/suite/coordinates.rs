@@ -1,8 +1,6 @@
 //! Standard normal coordinates of starts, against the distribution of worlds that they stand for.
 
-mod support;
-mod worlds;
-
+use crate::worlds::{Worlds, normals};
 use physics_model::config::ObstacleMobility;
 use physics_model::effect::EffectKind;
 use physics_model::theta::obstacle_class;
@@ -12,7 +10,6 @@ use push_task::coordinates::{START, sleeps};
 use push_task::sampling::{TruncatedNormal, WorldDistribution, effects};
 use push_task::{Coordinates, Observation, Particle};
 use rand::RngExt as _;
-use worlds::{Worlds, normals};
 
 const MOBILITIES: [ObstacleMobility; 2] = [ObstacleMobility::Fixed, ObstacleMobility::Movable];
 /// First coordinate of the obstacle.

@@ -5,8 +5,8 @@ use physics_model::{BodyState, ObjectShape, ObstacleTheta};
 use pomdp::{Outcome, Policy as _, Purpose, Seed};
 use push_task::{Action, GoalPolicy, Particle, PushModel};
 
-use super::support::model;
 use super::{PLUS_Y, particle, with_obstacle};
+use crate::support::model;
 
 /// Actions that an episode may take.
 const LONGEST: usize = 45;

@@ -1,7 +1,5 @@
 //! A transition is a function of (s, Θ, action, stream), bit for bit: whatever ran before, on any thread, after a write and a read.
 
-mod support;
-
 use physics_model::config::ObstacleMobility;
 use physics_model::theta::standard_com_m;
 use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
@@ -63,7 +61,7 @@ fn play(model: &PushModel, joints: &[f64], item: u64) -> Vec<String> {
 #[test]
 fn transitions_are_the_same_on_one_thread_and_on_many_in_any_order() {
     for (arm, mobility) in [("sawyer", ObstacleMobility::Movable), ("jaco", ObstacleMobility::Fixed)] {
-        let (model, joints) = support::model(arm, mobility);
+        let (model, joints) = crate::support::model(arm, mobility);
         let items = 0..24_u64;
         let alone: Vec<Vec<String>> = items.clone().map(|item| play(&model, &joints, item)).collect();
         for lines in &alone {
@@ -91,7 +89,7 @@ fn transitions_are_the_same_on_one_thread_and_on_many_in_any_order() {
 
 #[test]
 fn a_state_that_was_written_and_read_goes_on_as_if_it_had_not_been() {
-    let (model, joints) = support::model("sawyer", ObstacleMobility::Movable);
+    let (model, joints) = crate::support::model("sawyer", ObstacleMobility::Movable);
     for item in 0..24 {
         let mut particle = hypothesis(&model, &joints, item);
         let mut rng = Seed(4).stream(Purpose::Truth, item);

@@ -1,7 +1,5 @@
 //! The catalogue as a whole: names, neutral values, what shows of each effect, combinations, determinism.
 
-mod support;
-
 use std::sync::Arc;
 
 use physics_model::config::{ArmConfig, ObstacleMobility, ServoConfig};
@@ -18,7 +16,7 @@ fn model(arm: &str, effects: Vec<EffectConfig>) -> (PushModel, Vec<f64>) {
 }
 
 fn with_arm(name: &str, arm: ArmConfig, effects: Vec<EffectConfig>) -> (PushModel, Vec<f64>) {
-    let (plain, joints) = support::model(name, ObstacleMobility::Fixed);
+    let (plain, joints) = crate::support::model(name, ObstacleMobility::Fixed);
     let config = PushConfig { arm, effects, ..plain.config().clone() };
     (PushModel::new(config, Arc::new(plain.robot().clone())), joints)
 }

@@ -6,8 +6,8 @@ use physics_model::{EffectConfig, ObjectShape};
 use pomdp::{Purpose, Seed};
 use push_task::{Action, Particle, PushConfig, PushModel};
 
+use super::{PLUS_Y, particle};
 use crate::support::model;
-use crate::{PLUS_Y, particle};
 
 #[test]
 fn every_parameter_of_every_effect_acts_as_a_part_of_a_hypothesis() {

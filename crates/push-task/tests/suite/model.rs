@@ -1,8 +1,6 @@
 //! The pushing task as a generative model: conformance, rewards, sensors, determinism.
 
 mod goal_policy;
-#[path = "../support/mod.rs"]
-mod support;
 mod unknown_effects;
 
 use physics_model::config::ObstacleMobility;
@@ -10,9 +8,9 @@ use physics_model::world::World;
 use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
 use push_task::{Action, GoalPolicy, HeuristicPolicy, Particle, PushModel, State};
 
+use crate::support::model;
 use pomdp::conformance::{check_generative_model, check_observation_model};
 use pomdp::{Outcome, Policy as _, Purpose, Seed};
-use support::model;
 
 /// Moves along +y and −y.
 const PLUS_Y: usize = 2;

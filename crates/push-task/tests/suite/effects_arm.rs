@@ -1,7 +1,5 @@
 //! Effects on commands and sensors in the pushing task, against closed forms.
 
-mod support;
-
 use std::sync::Arc;
 
 use nalgebra::{Point3, Vector6};
@@ -18,7 +16,7 @@ const MINUS_Y: Action = Action::ALL[6];
 const G: f64 = 9.81;
 
 fn model(name: &str, effects: Vec<EffectConfig>) -> (PushModel, Vec<f64>) {
-    let (plain, joints) = support::model(name, ObstacleMobility::Fixed);
+    let (plain, joints) = crate::support::model(name, ObstacleMobility::Fixed);
     let config = PushConfig { effects, ..plain.config().clone() };
     (PushModel::new(config, Arc::new(plain.robot().clone())), joints)
 }

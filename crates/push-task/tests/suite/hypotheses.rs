@@ -1,7 +1,5 @@
 //! 100,000 random hypotheses: whatever is within the documented ranges steps without a panic, to a finite state or a counted divergence.
 
-mod support;
-
 use std::sync::OnceLock;
 
 use physics_model::config::ObstacleMobility;
@@ -77,7 +75,7 @@ fn check(
     problem: &Problem,
     case: (Theta, BodyState, BodyState, usize, bool),
 ) -> Outcome {
-    let (model, joints) = problem.get_or_init(|| support::model(arm, mobility));
+    let (model, joints) = problem.get_or_init(|| crate::support::model(arm, mobility));
     let (theta, object, obstacle, action, stand) = case;
     check_theta(&theta).expect("within the documented ranges");
     let tool = model.tool_position_m(joints);

@@ -1,8 +1,6 @@
 //! Actions of a history, replayed: as likely as the noise of sensors and transition allows.
 
-mod support;
-mod worlds;
-
+use crate::worlds::{Worlds, normals};
 use physics_model::config::ObstacleMobility;
 use pomdp::{GenerativeModel as _, Outcome, Policy as _, Purpose, Replay as _, Seed};
 use push_task::config::TransitionNoise;
@@ -10,7 +8,6 @@ use push_task::{
     Action, ActionReport, Answer, HeuristicPolicy, History, Observation, Particle, PushModel, STEP_COORDINATES,
 };
 use rand::{Rng as _, RngExt as _};
-use worlds::{Worlds, normals};
 
 const MOBILITIES: [ObstacleMobility; 2] = [ObstacleMobility::Fixed, ObstacleMobility::Movable];
 /// Arms, with how many values their sensors have that are not bound by others.

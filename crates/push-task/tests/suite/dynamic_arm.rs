@@ -1,7 +1,5 @@
 //! The dynamic arm: free motion, compliance, pushing, blocked pushes, determinism. Its inertia is tested beside its code.
 
-mod support;
-
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3, Vector6};
@@ -20,7 +18,7 @@ const SERVO: ServoConfig = ServoConfig { stiffness_nmprad: 5000.0, damping_ratio
 const PLUS_Y: Action = Action::ALL[2];
 
 fn setup(name: &str, arm: ArmConfig) -> PushModel {
-    let (plain, _) = support::model(name, ObstacleMobility::Fixed);
+    let (plain, _) = crate::support::model(name, ObstacleMobility::Fixed);
     PushModel::new(PushConfig { arm, ..plain.config().clone() }, Arc::new(plain.robot().clone()))
 }
 
