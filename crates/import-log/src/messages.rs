@@ -13,6 +13,8 @@ use crate::value::{Path, Value, join};
 
 /// Topics that a message of this program lists.
 const LISTED: usize = 40;
+/// Names that it lists of those that were not asked for.
+const NAMES: usize = 12;
 
 /// A message on its way from a file.
 pub(crate) struct Message<'a> {
@@ -50,6 +52,8 @@ struct Compiled {
     found: Vec<bool>,
     /// What the first message holds that lacks some.
     fields: Vec<String>,
+    /// Names of elements and of joints where the one that is asked for was not among them.
+    others: BTreeSet<String>,
     zero_stamps: u64,
 }
 
@@ -58,6 +62,15 @@ impl Compiled {
     fn look(&mut self, message: &Value) {
         if self.fields.is_empty() {
             self.fields = message.fields();
+        }
+    }
+
+    /// Keeps what stands where `path`, or a name, was looked for.
+    fn look_for(&mut self, others: impl IntoIterator<Item = String>) {
+        for other in others {
+            if self.others.len() < NAMES {
+                self.others.insert(excerpt(&other));
+            }
         }
     }
 }
@@ -101,6 +114,7 @@ impl<'a> Extractor<'a> {
                 messages: 0,
                 found: vec![false; track.picks.len()],
                 fields: Vec::new(),
+                others: BTreeSet::new(),
                 zero_stamps: 0,
             });
             if let Some(topic) = &track.topic {
@@ -136,8 +150,10 @@ impl<'a> Extractor<'a> {
         compiled.messages += 1;
         let Some(value) = compiled.at.follow(&message.value) else {
             compiled.look(&message.value);
+            compiled.look_for(compiled.at.others(&message.value));
             return Ok(());
         };
+        let mut others = Vec::new();
         let mut picked = Vec::with_capacity(track.width());
         for source in &compiled.sources {
             picked.push(match source {
@@ -155,9 +171,16 @@ impl<'a> Extractor<'a> {
                         Part::Of(place, name) => at.and_then(|at| at.part(place.unwrap_or(usize::MAX), name)),
                         Part::Named(name) => {
                             let names = compiled.names.as_ref().and_then(|names| names.follow(value));
-                            at.and_then(|at| at.part(position(names?, name)?, ""))
+                            let place = names.and_then(|names| position(names, name));
+                            if let (None, Some(Value::List(names))) = (place, names) {
+                                others.extend(names.iter().filter_map(Value::words));
+                            }
+                            at.zip(place).and_then(|(at, place)| at.part(place, ""))
                         }
                     };
+                    if at.is_none() {
+                        others.extend(path.others(value));
+                    }
                     if track.quantity == Quantity::Label {
                         found.and_then(Value::words).map_or(f64::NAN, |words| self.store.label(&words))
                     } else {
@@ -168,6 +191,7 @@ impl<'a> Extractor<'a> {
         }
         if picked.iter().any(|value| value.is_nan()) {
             compiled.look(&message.value);
+            compiled.look_for(others);
         }
         if picked.iter().all(|value| value.is_nan()) {
             return Ok(());
@@ -234,13 +258,18 @@ fn not_there(track: &Track, compiled: &Compiled) -> String {
         }
     }
     let fields: Vec<String> = compiled.fields.iter().map(|field| excerpt(field)).collect();
+    let others: Vec<&str> = compiled.others.iter().map(String::as_str).collect();
+    let hint = match (unordered, others.as_slice()) {
+        (true, _) => " (a quaternion that is a list needs its order)".into(),
+        (false, []) => String::new(),
+        (false, others) => format!(" (by name there are {})", others.join(", ")),
+    };
     format!(
-        "expected readings at {} in messages of {}, which hold {}, found {} messages without some{}",
+        "expected readings at {} in messages of {}, which hold {}, found {} messages without some{hint}",
         paths.join(" and "),
         excerpt(track.topic.as_deref().unwrap_or_default()),
         if fields.is_empty() { "others".into() } else { fields.join(", ") },
         compiled.messages,
-        if unordered { " (a quaternion that is a list needs its order)" } else { "" }
     )
 }
 

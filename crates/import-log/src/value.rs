@@ -148,6 +148,18 @@ impl Path {
             _ => None,
         })
     }
+
+    /// Where no element of a list has the value that the path asks for: those that there are, as the path would name them.
+    pub(crate) fn others(&self, value: &Value) -> Vec<String> {
+        let failing = (0..self.0.len()).find(|steps| Self(self.0[..=*steps].to_vec()).follow(value).is_none());
+        let Some((Step::Where(path, _), before)) = failing.map(|at| (&self.0[at], Self(self.0[..at].to_vec()))) else {
+            return Vec::new();
+        };
+        match before.follow(value) {
+            Some(Value::List(list)) => list.iter().filter_map(|one| path.follow(one)?.words()).collect(),
+            _ => Vec::new(),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -170,6 +182,15 @@ mod tests {
             assert_eq!(found, expected, "{path}");
         }
         assert_eq!(Path::parse("").unwrap().follow(&sample()), Some(&sample()));
+    }
+
+    #[test]
+    fn an_element_of_a_name_that_is_not_there_is_told_with_those_that_are() {
+        let others = |path: &str| Path::parse(path).unwrap().others(&sample());
+        assert_eq!(others("list[frame=c].x"), ["a", "b/c"]);
+        for path in ["list[frame=a].y", "list[7]", "lost[frame=a]", "list[frame=a].x"] {
+            assert!(others(path).is_empty(), "{path}");
+        }
     }
 
     #[test]
