@@ -12,7 +12,7 @@ use crate::pipeline::trained;
 /// depends on the machine, the result must not.
 const HITS: u32 = 13;
 /// The same of a program that begins anew: what it leaves is the same at most moments.
-const HITS_ANEW: u32 = 5;
+const HITS_ANEW: u32 = 3;
 
 /// A program with its arguments, and what of its folder must be the same in the end.
 struct Work<'a> {

@@ -32,7 +32,7 @@ pub(crate) fn episodes(
         let times = if keep_rows {
             piece.rows.clone().filter_map(|row| first_stream(plan, &store)?.times.get(row).copied()).collect()
         } else {
-            grid(plan, &store, piece, mapping.header.period_secs, rows, source)?
+            grid(mapping, plan, &store, piece, rows)?
         };
         let Some(start) = times.first().copied() else { continue };
         rows += times.len();
@@ -93,14 +93,8 @@ fn ids(pieces: &[Piece], first: u64) -> Vec<u64> {
 
 /// The moments of the rows of an episode: from its first reading to its last.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded first")]
-fn grid(
-    plan: &Plan,
-    store: &Store,
-    piece: &Piece,
-    period_secs: f64,
-    before: usize,
-    source: &Path,
-) -> Result<Vec<f64>, Error> {
+fn grid(mapping: &Mapping, plan: &Plan, store: &Store, piece: &Piece, before: usize) -> Result<Vec<f64>, Error> {
+    let period_secs = mapping.header.period_secs;
     let (mut start, mut end) = (f64::INFINITY, f64::NEG_INFINITY);
     for (track, stream) in plan.tracks.iter().zip(&store.streams) {
         if track.quantity == Quantity::Label {
@@ -118,7 +112,13 @@ fn grid(
     }
     let steps = (end - start) / period_secs + 1e-3;
     if steps >= (MAX_ROWS - before.min(MAX_ROWS)) as f64 {
-        return Err(too_many(source, before.saturating_add(steps as usize)));
+        let reason = format!(
+            "expected an episode of at most {} rows after those before it, found one of {:.3e} s, which has {steps:.3e} rows of {period_secs} s: \
+             another unit, another cut or a longer log.period_secs",
+            MAX_ROWS - before.min(MAX_ROWS),
+            end - start
+        );
+        return Err(mapping.wrong("clock.unit", reason));
     }
     Ok((0..=steps as usize).map(|step| start + step as f64 * period_secs).collect())
 }

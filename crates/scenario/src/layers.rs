@@ -91,9 +91,15 @@ impl Layers {
     /// The last layer that says anything on `key` or, failing that, on the nearest table above it.
     fn origin(&self, key: &str) -> String {
         let parts: Vec<&str> = key.split(['.', '[']).map(|p| p.trim_end_matches(']')).collect();
-        let found = (1..=parts.len()).rev().find_map(|length| self.last_with(&parts[..length]));
+        let found = (1..=parts.len()).rev().find_map(|length| Some((self.last_with(&parts[..length])?, length)));
         match found {
-            Some(source) => source.name.clone(),
+            // No file says it: the robot's may have to, wherever else its table stands.
+            Some((source, length)) if length < parts.len() && !key.contains('[') => {
+                let robot = self.0.iter().map(|layer| &layer.source).find(|s| s.layer == LayerKind::Robot);
+                let robot = robot.filter(|robot| *robot != source).map(|robot| format!("{} + ", robot.name));
+                robot.unwrap_or_default() + &source.name
+            }
+            Some((source, _)) => source.name.clone(),
             None => {
                 // Whose it is to say; all layers where it is nobody's.
                 let whose = match parts[0] {
@@ -213,6 +219,13 @@ mod tests {
             };
             assert_eq!(message, format!("{mine}: key `{key}`: {missing}"));
         }
+        // An arm alone, without the task where it stands.
+        let text = std::fs::read_to_string(root.join("scenarios/robots/sawyer.toml")).unwrap();
+        let mut table: toml::Table = toml::from_str(&text).unwrap();
+        table.retain(|key, _| key == "robot");
+        std::fs::write(&file, table.to_string()).unwrap();
+        let message = Selection { robot: mine.clone(), ..Selection::new(&root) }.load().unwrap_err().to_string();
+        assert!(message.starts_with(&format!("{mine} + ")) && message.contains("is missing"), "{message}");
         // A file of another kind, whose keys would only be missed elsewhere.
         let other = root.join("scenarios/d4.toml").display().to_string();
         let message = Selection { robot: other.clone(), ..Selection::new(&root) }.load().unwrap_err().to_string();

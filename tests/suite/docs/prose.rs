@@ -1,6 +1,6 @@
 //! Documents read easily and are spelt right. What a sentence is, `end_to_end::prose` says.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::Path;
 
@@ -56,7 +56,7 @@ fn what_newcomers_read_has_short_sentences() {
 }
 
 /// What is known to be written wrong, in small letters, and what is meant.
-fn misspellings() -> HashMap<String, String> {
+fn misspellings() -> BTreeMap<String, String> {
     let packed = std::fs::File::open(root().join("tests/data/misspellings/misspellings.csv.gz")).unwrap();
     let mut text = String::new();
     flate2::read::GzDecoder::new(packed).read_to_string(&mut text).unwrap();
