@@ -42,7 +42,7 @@ pub(crate) fn shake(part: &Study, best: &mut Fit) {
 }
 
 /// Pairs of effects that do nearly the same: what one does at some strength, the other does at another.
-const TWINS: [[EffectKind; 2]; 9] = [
+const TWINS: [[EffectKind; 2]; 11] = [
     [EffectKind::TableTilt, EffectKind::ConstantForce],
     [EffectKind::Tether, EffectKind::TableTilt],
     [EffectKind::Tether, EffectKind::ConstantForce],
@@ -52,6 +52,9 @@ const TWINS: [[EffectKind; 2]; 9] = [
     [EffectKind::PoseDelay, EffectKind::ActuationDelay],
     [EffectKind::ForceDelay, EffectKind::ForceLowPass],
     [EffectKind::FrictionLevel, EffectKind::ForceGain],
+    // Of a workspace that lies to one side of the origin.
+    [EffectKind::PoseOffset, EffectKind::PoseScale],
+    [EffectKind::PoseOffset, EffectKind::PoseRotation],
 ];
 
 /// Whether two kinds of effects do nearly the same.
@@ -84,9 +87,7 @@ pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Be
         }
         // What the spring pulls with where objects begin.
         (EffectConfig::Tether(tether), EffectKind::ConstantForce | EffectKind::TableTilt) => {
-            let starts = part.chosen.iter().map(|index| part.simulator.trials[*index].start.position_m);
-            let n = part.chosen.len().max(1) as f64;
-            let [x, y] = starts.fold([0.0; 2], |[x, y], start| [x + start[0] / n, y + start[1] / n]);
+            let [x, y] = mean(starts(part));
             let pull = [x - tether.anchor_x_m, y - tether.anchor_y_m].map(|off| -tether.stiffness_npm * off);
             let weight_n = if candidate.kind() == EffectKind::TableTilt { weight_n(part, z) } else { 1.0 };
             candidate.coordinates_of(&pull.map(|force_n| force_n / weight_n))
@@ -98,6 +99,22 @@ pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Be
         (EffectConfig::PoseScale(pose), EffectKind::TimeBase) if !has_tool => {
             candidate.coordinates_of(&[pose.scale.powf(-0.5)])
         }
+        (EffectConfig::PoseOffset(pose), EffectKind::PoseScale) => {
+            let offset = [pose.offset_x_m, pose.offset_y_m];
+            candidate.coordinates_of(&[1.0 + as_multiple(starts(part), offset)?])
+        }
+        (EffectConfig::PoseOffset(pose), EffectKind::PoseRotation) => {
+            let offset = [pose.offset_x_m, pose.offset_y_m];
+            candidate.coordinates_of(&[as_multiple(starts(part).map(turned), offset)?])
+        }
+        (EffectConfig::PoseScale(pose), EffectKind::PoseOffset) => {
+            let [x, y] = as_offset(starts(part), pose.scale - 1.0)?;
+            candidate.coordinates_of(&[x, y, 0.0])
+        }
+        (EffectConfig::PoseRotation(pose), EffectKind::PoseOffset) => {
+            let [x, y] = as_offset(starts(part).map(turned), pose.yaw_rad)?;
+            candidate.coordinates_of(&[x, y, 0.0])
+        }
         _ => translate(part, z, (found, own), candidate)?,
     };
     let at = |share: f64| {
@@ -108,6 +125,46 @@ pub(crate) fn follow(part: &Study, best: &Fit, model: &Model) -> Option<(f64, Be
         (cost, Begin { x, raw: Some(raw), jacobian: Vec::new() })
     };
     [1.0, 1.5, 2.25].map(at).into_iter().min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Where the object begins in each episode, x and y.
+fn starts<'a>(part: &'a Study) -> impl Iterator<Item = [f64; 2]> + Clone + use<'a> {
+    part.chosen.iter().map(|index| {
+        let [x, y, _] = part.simulator.trials[*index].start.position_m;
+        [x, y]
+    })
+}
+
+/// Where a place goes when it is turned about the origin, for each radian of a small angle.
+fn turned([x, y]: [f64; 2]) -> [f64; 2] {
+    [-y, x]
+}
+
+fn mean(places: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+    let (count, [x, y]) = places.fold((0.0, [0.0; 2]), |(n, [x, y]), place| (n + 1.0, [x + place[0], y + place[1]]));
+    [x, y].map(|sum| sum / f64::max(count, 1.0))
+}
+
+fn squared([x, y]: [f64; 2]) -> f64 {
+    x * x + y * y
+}
+
+/// The multiple of `ways` that comes nearest to the same offset everywhere, by least squares; `None` where it cannot do most of it.
+fn as_multiple(ways: impl Iterator<Item = [f64; 2]> + Clone, offset: [f64; 2]) -> Option<f64> {
+    let squares: f64 = ways.clone().map(squared).sum();
+    let multiple = ways.clone().map(|[x, y]| x * offset[0] + y * offset[1]).sum::<f64>() / squares;
+    let left: f64 = ways.map(|[x, y]| squared([offset[0] - multiple * x, offset[1] - multiple * y])).sum();
+    let all = (left + multiple * multiple * squares).max(f64::MIN_POSITIVE);
+    (left < MOST * all).then_some(multiple)
+}
+
+/// The offset that comes nearest to a multiple of `ways`, likewise.
+fn as_offset(ways: impl Iterator<Item = [f64; 2]> + Clone, multiple: f64) -> Option<[f64; 2]> {
+    let middle = mean(ways.clone());
+    let (left, all) = ways.fold((0.0, f64::MIN_POSITIVE), |(left, all), way| {
+        (left + squared([way[0] - middle[0], way[1] - middle[1]]), all + squared(way))
+    });
+    (left < MOST * all).then_some(middle.map(|way| multiple * way))
 }
 
 /// Weight of the object, N.
@@ -314,4 +371,25 @@ fn translate(part: &Study, z: &[f64], found: (&Candidate, &[f64]), other: &Candi
         left.axpy(-coordinates[*index], slope, 1.0);
     }
     (left.norm_squared() < MOST * change.norm_squared()).then_some(coordinates)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_from_the_origin_a_frame_that_is_off_looks_like_an_offset() {
+        let far = [[0.5, 0.05], [0.5, -0.05], [0.45, 0.0], [0.55, 0.0]];
+        let near = |found: f64, expected: f64| (found - expected).abs() < 0.02 * expected.abs();
+        // A scale of 0.95 moves what is half a metre away by 25 mm.
+        assert!(near(as_multiple(far.into_iter(), [-0.025, 0.0]).unwrap(), -0.05));
+        assert!(near(as_multiple(far.into_iter().map(turned), [0.0, 0.01]).unwrap(), 0.02));
+        assert!(near(as_offset(far.into_iter(), -0.05).unwrap()[0], -0.025));
+        assert!(near(as_offset(far.into_iter().map(turned), 0.02).unwrap()[1], 0.01));
+        // To the side it does not, and about the origin neither.
+        assert!(as_multiple(far.into_iter(), [0.0, 0.01]).is_none());
+        let about = [[0.05, 0.0], [-0.05, 0.0], [0.0, 0.05], [0.0, -0.05]];
+        assert!(as_multiple(about.into_iter(), [0.01, 0.0]).is_none() && as_offset(about.into_iter(), 0.05).is_none());
+        assert!(as_multiple(std::iter::empty(), [0.01, 0.0]).is_none());
+    }
 }
