@@ -155,7 +155,7 @@ fn as_multiple(ways: impl Iterator<Item = [f64; 2]> + Clone, offset: [f64; 2]) -
     let multiple = ways.clone().map(|[x, y]| x * offset[0] + y * offset[1]).sum::<f64>() / squares;
     let left: f64 = ways.map(|[x, y]| squared([offset[0] - multiple * x, offset[1] - multiple * y])).sum();
     let all = (left + multiple * multiple * squares).max(f64::MIN_POSITIVE);
-    (left < MOST * all).then_some(multiple)
+    (multiple.is_finite() && left < MOST * all).then_some(multiple)
 }
 
 /// The offset that comes nearest to a multiple of `ways`, likewise.
