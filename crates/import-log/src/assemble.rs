@@ -62,8 +62,9 @@ fn check_clocks(mapping: &Mapping, plan: &Plan, store: &Store, episodes: usize) 
         let times = stream.times.len();
         if !lasts && stream.replaced > 0 && times <= episodes.max(1) {
             let found = times + stream.replaced;
-            let reason =
-                format!("expected a clock that goes on, found {times} times in {found} readings; log is another");
+            let reason = format!(
+                "expected a clock that goes on, found {times} times in {found} readings: another stamp, such as log, may do"
+            );
             return Err(mapping.wrong(format!("{}.stamp", track.quantity.key()), reason));
         }
     }
