@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use discrepancy::{ModelFile, Nominal, Report, Settings, Verdict, diagnose, rig_tool};
-use measured_log::{Log, Number};
+use measured_log::{Axis, Channel, Log, Number};
 
 fn logs() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs")
@@ -138,6 +138,29 @@ fn a_tool_of_another_size_than_the_log_says_is_told_by_when_it_touches() {
         "{description}"
     );
     assert!(found.next_experiment.starts_with("Measure the tool and the object"), "{}", found.next_experiment);
+}
+
+#[test]
+fn a_scale_of_a_frame_whose_origin_is_far_away_is_no_offset() {
+    // Half a metre from the origin a scale of 0.95 moves every pose by about 25 mm.
+    const SCALE: f64 = 0.95;
+    let mut log = measured_log::read(&logs().join("set-002")).unwrap();
+    for episode in &mut log.episodes {
+        for (channel, readings) in &mut episode.channels {
+            let moved = |value: f64| match channel {
+                Channel::Command(Axis::X) | Channel::Tool(Axis::X) => value + 0.5,
+                Channel::ObjectPosition(Axis::X) => SCALE * (value + 0.5),
+                Channel::ObjectPosition(_) => SCALE * value,
+                _ => value,
+            };
+            *readings = readings.iter().map(|reading| reading.map(moved)).collect();
+        }
+    }
+    let (found, _) = of(&log, "set-002", None);
+    let [effect] = found.effects.as_slice() else { panic!("{}", found.summary) };
+    assert_eq!(effect.name, "pose_scale", "{}", found.summary);
+    assert!((effect.parameters[0].value - SCALE).abs() < 0.002, "{:?}", effect.parameters);
+    assert!(found.heldout.after < 1.1, "{:?}", found.heldout);
 }
 
 #[test]
