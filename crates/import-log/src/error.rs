@@ -145,3 +145,8 @@ pub(crate) fn excerpt(text: &str) -> String {
     }
     format!("`{short}`")
 }
+
+/// What to write where a list is longer than the vector that it was named for.
+pub(crate) fn one_by_one(path: &str) -> String {
+    format!("(elements are named one by one, as in [\"{path}[0]\", …])")
+}

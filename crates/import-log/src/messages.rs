@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path as FilePath;
 
 use crate::Error;
-use crate::error::excerpt;
+use crate::error::{excerpt, one_by_one};
 use crate::mapping::Mapping;
 use crate::plan::{Part, Pick, Plan, Quantity, Stamp, Track};
 use crate::rows::{moment, too_large};
@@ -276,10 +276,7 @@ fn not_there(track: &Track, compiled: &Compiled) -> String {
 /// Of a list some numbers would be taken and others left, by their order alone.
 fn longer(pick: &Pick, count: usize, found: usize) -> String {
     let path = if let Pick::Value { path, .. } = pick { path.as_str() } else { "" };
-    format!(
-        "expected a list of {count} at {}, found one of {found} (elements are named one by one, as in [\"{path}[0]\", …])",
-        excerpt(path)
-    )
+    format!("expected a list of {count} at {}, found one of {found} {}", excerpt(path), one_by_one(path))
 }
 
 fn unstamped(message: &Message<'_>, track: &Track, found: &str) -> Error {

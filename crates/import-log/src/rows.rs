@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::Error;
-use crate::error::excerpt;
+use crate::error::{excerpt, one_by_one};
 use crate::mapping::{Mapping, Sampling};
 use crate::plan::{Part, Pick, Plan, Quantity, Stamp};
 use crate::store::{Moment, Store};
@@ -135,7 +135,7 @@ impl<'a> Extractor<'a> {
         if let Some(place) = self.beyond.iter().find(|place| !matches!(cell(**place), Value::Missing)) {
             let (count, name) = (place.element.unwrap_or_default(), &self.names[place.column]);
             let where_ = format!("row {}, column {}", self.row, excerpt(name));
-            let found = format!("a longer one (elements are named one by one, as in [\"{name}[0]\", …])");
+            let found = format!("a longer one {}", one_by_one(name));
             return Err(Error::source(self.path, where_, &format!("a list of {count}"), found));
         }
         let keep_rows = self.plan.sample == Sampling::Rows;

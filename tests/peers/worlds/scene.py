@@ -124,28 +124,47 @@ def volume_m3(shape, size):
     return math.pi * size[0] ** 2 * size[1] if shape == "cylinder" else 4 / 3 * math.pi * size[0] ** 3
 
 
-def draw_body(rng, kind):
-    """Size, mass and friction that go together: 2 to 50 cm, 3 g to 20 kg, no lighter than foam and no heavier than stone."""
+@dataclass
+class Bodies:
+    """Between what bodies are drawn."""
+
+    length_m: tuple = (0.02, 0.5)
+    friction: tuple = (0.15, 0.7)
+    width: float = 0.45  # least, as a share of the length
+    height: float = 0.3  # least, as a share of what does not tip over
+    density_kgm3: tuple = (60.0, 3000.0)  # no lighter than foam and no heavier than stone
+    mass_kg: tuple = (0.003, 20.0)
+    digits: int = 4
+
+
+def draw_body(rng, kind, bodies=Bodies()):
+    """Size, mass and friction that go together."""
     while True:
-        length = log_uniform(rng, 0.02, 0.5)
-        friction = float(rng.uniform(0.15, 0.7))
+        length = log_uniform(rng, *bodies.length_m)
+        friction = float(rng.uniform(*bodies.friction))
         if kind == "box":
-            other = length * rng.uniform(0.45, 1.0)
+            other = length * rng.uniform(bodies.width, 1.0)
             # Lower than what would tip over when it is pushed.
             high = min(length, 0.8 * other / friction)
-            size = [length, other, rng.uniform(0.3, 0.9) * high]
+            size = [length, other, rng.uniform(bodies.height, 0.9) * high]
         elif kind == "upright":
             radius = length / 2
-            size = [radius, rng.uniform(0.3, 0.9) * min(2 * length, 0.8 * length / friction)]
+            size = [radius, rng.uniform(bodies.height, 0.9) * min(2 * length, 0.8 * length / friction)]
         elif kind == "lying":
             size = [length / 2, length * rng.uniform(0.6, 2.0)]
         else:
             size = [length / 2]
-        size = [round(float(v), 4) for v in size]
+        size = [round(float(v), bodies.digits) for v in size]
         shape = "cylinder" if kind in ("upright", "lying") else kind
-        mass = volume_m3(shape, size) * log_uniform(rng, 60.0, 3000.0)
-        if 0.003 <= mass <= 20.0 and min(size) > 0.005:
+        mass = volume_m3(shape, size) * log_uniform(rng, *bodies.density_kgm3)
+        if bodies.mass_kg[0] <= mass <= bodies.mass_kg[1] and min(size) > 0.005:
             return size, float(mass), friction
+
+
+def draw_kind(rng, shapes, unsuitable):
+    """One of the kinds that the engine can hold."""
+    share = np.array([0.0 if kind in unsuitable else p for kind, p in shapes.items()])
+    return str(rng.choice(list(shapes), p=share / share.sum()))
 
 
 def stated(rng, value, exact):
@@ -160,8 +179,7 @@ def stated(rng, value, exact):
 
 def draw_scene(rng, unsuitable=()):
     """A scene whose object is of none of the kinds that the engine cannot hold."""
-    share = np.array([0.0 if kind in unsuitable else p for kind, p in SHAPES.items()])
-    kind = str(rng.choice(list(SHAPES), p=share / share.sum()))
+    kind = draw_kind(rng, SHAPES, unsuitable)
     size, mass, friction = draw_body(rng, kind)
     tool_friction = float(round(rng.uniform(0.05, 0.4), 3))
     centre = [0.0, 0.0] if rng.random() < 0.5 else [float(rng.uniform(0.3, 0.7)), float(rng.uniform(-0.3, 0.3))]

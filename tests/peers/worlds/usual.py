@@ -2,38 +2,16 @@
 clocks nearly together, forces as means over a tick, mass and friction known to 10 %. `scene.py` draws from everything that could be.
 """
 
-import numpy as np
-
-from scene import Rig, Scene, log_uniform, stated, volume_m3
+from scene import Bodies, Rig, Scene, draw_body, draw_kind, log_uniform, stated
 
 SHAPES = {"box": 0.55, "upright": 0.25, "lying": 0.1, "sphere": 0.1}
-
-
-def draw_body(rng, kind):
-    """Size, mass and friction: 4 to 20 cm, 50 g to 3 kg, as heavy as wood, plastic or a filled can."""
-    while True:
-        length = log_uniform(rng, 0.04, 0.2)
-        friction = float(rng.uniform(0.2, 0.55))
-        if kind == "box":
-            other = length * rng.uniform(0.5, 1.0)
-            size = [length, other, rng.uniform(0.4, 0.9) * min(length, 0.8 * other / friction)]
-        elif kind == "upright":
-            size = [length / 2, rng.uniform(0.4, 0.9) * min(2 * length, 0.8 * length / friction)]
-        elif kind == "lying":
-            size = [length / 2, length * rng.uniform(0.6, 2.0)]
-        else:
-            size = [length / 2]
-        size = [round(float(v), 3) for v in size]
-        shape = "cylinder" if kind in ("upright", "lying") else kind
-        mass = volume_m3(shape, size) * log_uniform(rng, 200.0, 1500.0)
-        if 0.05 <= mass <= 3.0:
-            return size, float(mass), friction
+# As heavy as wood, plastic or a filled can.
+BODIES = Bodies(length_m=(0.04, 0.2), friction=(0.2, 0.55), width=0.5, height=0.4, density_kgm3=(200.0, 1500.0), mass_kg=(0.05, 3.0), digits=3)
 
 
 def draw_scene(rng, unsuitable=()):
-    share = np.array([0.0 if kind in unsuitable else p for kind, p in SHAPES.items()])
-    kind = str(rng.choice(list(SHAPES), p=share / share.sum()))
-    size, mass, friction = draw_body(rng, kind)
+    kind = draw_kind(rng, SHAPES, unsuitable)
+    size, mass, friction = draw_body(rng, kind, BODIES)
     tool_friction = float(round(rng.uniform(0.1, 0.4), 3))
     scene = Scene(kind, size, mass, friction, tool_friction, 0.0, [0.5, 0.0], {})
     scene.tool_radius_m = round(float(min(rng.uniform(0.008, 0.025), 0.9 * scene.half_height_m)), 4)

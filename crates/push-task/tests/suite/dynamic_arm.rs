@@ -7,10 +7,10 @@ use physics_model::config::{ArmConfig, ObstacleMobility, ServoConfig};
 use physics_model::motion::minimum_jerk;
 use physics_model::robot::{IkOptions, Robot};
 use physics_model::world::{ToolPose, World, Wrench};
-use physics_model::{BodyState, ObjectShape, ObjectTheta, ObstacleTheta, Theta};
+use physics_model::{BodyState, ObjectShape, ObstacleTheta, Theta};
 use pomdp::{Outcome, Purpose, Seed};
 use proptest::prelude::*;
-use push_task::{Action, Particle, PushConfig, PushModel, State};
+use push_task::{Action, Particle, PushConfig, PushModel};
 
 const ARMS: [&str; 2] = ["sawyer", "jaco"];
 /// The gains that `scenarios/base.toml` names.
@@ -28,23 +28,6 @@ fn dynamic(name: &str) -> PushModel {
 
 fn start(model: &PushModel) -> Vec<f64> {
     model.joints_for(model.robot().home_rad(), model.config().task.tool_start_m).unwrap()
-}
-
-/// The usual box, `ahead_m` before the tool along +y.
-fn particle(model: &PushModel, joints: &[f64], ahead_m: f64) -> Particle {
-    let tool = model.tool_position_m(joints);
-    let object = ObjectTheta {
-        shape: ObjectShape::Box,
-        mass_kg: 0.5,
-        com_m: [0.0; 3],
-        friction: 0.4,
-        size_m: [0.08, 0.08, 0.1],
-    };
-    let body = BodyState::at_rest([tool[0], tool[1] + ahead_m, model.config().world.table_height_m + 0.05], 0.0);
-    Particle::new(
-        State { joints_rad: joints.to_vec(), object: body, obstacle: None },
-        Theta { object, obstacle: None, effects: vec![] },
-    )
 }
 
 fn with_obstacle(mut particle: Particle, beyond_object_m: f64) -> Particle {
@@ -98,7 +81,7 @@ fn free_motion_follows_the_minimum_jerk_path() {
             let from = [share(reach.x_m, at(0)), share(reach.y_m, at(1)), share(reach.z_m, at(2))];
             let Some(joints) = model.joints_for(&start(&model), from) else { continue };
             // Far from everything.
-            let particle = particle(&model, &joints, 3.0);
+            let particle = crate::support::particle_ahead(&model, &joints, 3.0);
             let from = Vector3::from(model.tool_position_m(&joints));
             for action in Action::ALL {
                 let mut world = world(&model, &SERVO, &particle);
@@ -131,7 +114,7 @@ fn press(model: &PushModel, servo: &ServoConfig, depth_m: f64) -> (Wrench, Vecto
     let joints = start(model);
     // The leading point of the tool along +y touches the obstacle's face.
     let reach = if robot.name() == "sawyer" { 0.025 } else { 0.0965 };
-    let mut particle = with_obstacle(particle(model, &joints, 3.0), 0.0);
+    let mut particle = with_obstacle(crate::support::particle_ahead(model, &joints, 3.0), 0.0);
     let tool = model.tool_position_m(&joints);
     let table = model.config().world.table_height_m;
     particle.state.obstacle = Some(BodyState::at_rest([tool[0], tool[1] + reach + 0.04, table + 0.05], 0.0));
@@ -180,7 +163,10 @@ fn a_push_of_two_newtons_is_that_of_the_kinematic_arm() {
         let (truth, plain) = (dynamic(name), setup(name, ArmConfig::Kinematic));
         let joints = start(&truth);
         let ahead = if name == "sawyer" { 0.075 } else { 0.16 };
-        let (mut a, mut b) = (particle(&truth, &joints, ahead), particle(&plain, &joints, ahead));
+        let (mut a, mut b) = (
+            crate::support::particle_ahead(&truth, &joints, ahead),
+            crate::support::particle_ahead(&plain, &joints, ahead),
+        );
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         for action in 1..=5 {
             truth.act(&mut a, PLUS_Y, &mut rng);
@@ -213,7 +199,7 @@ fn a_blocked_push_is_a_large_force_and_stops_the_arm() {
         let model = dynamic(name);
         let joints = start(&model);
         let ahead = if name == "sawyer" { 0.075 } else { 0.16 };
-        let mut particle = with_obstacle(particle(&model, &joints, ahead), 0.1);
+        let mut particle = with_obstacle(crate::support::particle_ahead(&model, &joints, ahead), 0.1);
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         let (mut large, mut advance) = (0, 0.0);
         for _ in 0..8 {
@@ -237,7 +223,7 @@ fn free_actions_end_where_they_are_commanded() {
     for name in ARMS {
         let model = dynamic(name);
         // Beyond the goal region.
-        let mut particle = particle(&model, &start(&model), 0.45);
+        let mut particle = crate::support::particle_ahead(&model, &start(&model), 0.45);
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         // A round trip: up, in a circle, down.
         for index in [8, 0, 1, 2, 3, 4, 5, 6, 7, 9] {
@@ -256,7 +242,7 @@ fn an_arm_that_does_not_move_stays_where_it_is() {
     for name in ARMS {
         let model = dynamic(name);
         let joints = start(&model);
-        let mut world = world(&model, &SERVO, &particle(&model, &joints, 3.0));
+        let mut world = world(&model, &SERVO, &crate::support::particle_ahead(&model, &joints, 3.0));
         for _ in 0..60 {
             world.step_arm(&joints);
         }
@@ -273,12 +259,12 @@ fn an_action_depends_on_nothing_that_ran_before() {
         let joints = start(&model);
         let ahead = if name == "sawyer" { 0.07 } else { 0.14 };
         let run = || {
-            let mut particle = particle(&model, &joints, ahead);
+            let mut particle = crate::support::particle_ahead(&model, &joints, ahead);
             let step = model.act(&mut particle, PLUS_Y, &mut Seed(3).stream(Purpose::Test, 0)).0;
             (particle, step.observation)
         };
         let first = run();
-        let mut other = with_obstacle(particle(&model, &joints, ahead), 0.09);
+        let mut other = with_obstacle(crate::support::particle_ahead(&model, &joints, ahead), 0.09);
         for action in Action::ALL {
             model.act(&mut other, action, &mut Seed(4).stream(Purpose::Test, 0));
         }
@@ -307,7 +293,7 @@ proptest! {
         let arm = ArmConfig::Dynamic(servo);
         prop_assert_eq!(arm.problem(), None);
         let model = setup(if sawyer { "sawyer" } else { "jaco" }, arm);
-        let mut p = with_obstacle(particle(&model, &start(&model), 0.1), 0.1);
+        let mut p = with_obstacle(crate::support::particle_ahead(&model, &start(&model), 0.1), 0.1);
         let values = [mass, 0.0, 0.0, 0.0, 0.4, size[0], size[1], size[2], mass, size[1], size[2], size[0]];
         p.theta = Theta::from_parts(&values, [obstacle % 3, obstacle]);
         if p.theta.obstacle.is_none() {

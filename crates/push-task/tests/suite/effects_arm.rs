@@ -7,9 +7,9 @@ use physics_model::config::{ArmConfig, ObstacleMobility, ServoConfig};
 use physics_model::effects::*;
 use physics_model::robot::ToolShape;
 use physics_model::world::{ToolPose, World};
-use physics_model::{BodyState, EffectConfig, ObjectShape, ObjectTheta, Theta};
+use physics_model::{BodyState, EffectConfig, ObjectShape, ObjectTheta};
 use pomdp::{Purpose, Rng, Seed};
-use push_task::{Action, Particle, PushConfig, PushModel, State};
+use push_task::{Action, PushConfig, PushModel};
 
 const PLUS_Y: Action = Action::ALL[2];
 const MINUS_Y: Action = Action::ALL[6];
@@ -25,29 +25,12 @@ fn rng() -> Rng {
     Seed(1).stream(Purpose::Test, 0)
 }
 
-/// The usual box, `ahead_m` before the tool along +y.
-fn particle(model: &PushModel, joints: &[f64], ahead_m: f64) -> Particle {
-    let [x, y, _] = model.tool_position_m(joints);
-    let object = ObjectTheta {
-        shape: ObjectShape::Box,
-        mass_kg: 0.5,
-        com_m: [0.0; 3],
-        friction: 0.4,
-        size_m: [0.08, 0.08, 0.1],
-    };
-    let body = BodyState::at_rest([x, y + ahead_m, model.config().world.table_height_m + 0.05], 0.0);
-    Particle::new(
-        State { joints_rad: joints.to_vec(), object: body, obstacle: None },
-        Theta { object, obstacle: None, effects: vec![] },
-    )
-}
-
 #[test]
 fn a_soft_arm_lags_by_force_over_stiffness() {
     let (plain, _) = model("sawyer", vec![]);
     let config =
         physics_model::config::WorldConfig { tool_friction: 0.0, table_height_m: 0.0, ..plain.config().world.clone() };
-    let theta = particle(&plain, plain.robot().home_rad(), 0.0).theta;
+    let theta = crate::support::particle_ahead(&plain, plain.robot().home_rad(), 0.0).theta;
     for stiffness_npm in [500.0, 5000.0] {
         let effects = vec![EffectConfig::ArmCompliance(ArmCompliance { stiffness_npm }).build()];
         let tool = ToolPose { position_m: [0.0, 0.0, 0.03], orientation: [0.0, 0.0, 0.0, 1.0] };
@@ -90,7 +73,7 @@ fn a_soft_arm_that_is_blocked_pushes_with_its_stiffness_times_what_is_missing() 
     ];
     let (plain, _) = model("sawyer", vec![]);
     let config = physics_model::config::WorldConfig { table_height_m: 0.0, ..plain.config().world.clone() };
-    let theta = particle(&plain, plain.robot().home_rad(), 0.0).theta;
+    let theta = crate::support::particle_ahead(&plain, plain.robot().home_rad(), 0.0).theta;
     let tool = ToolPose { position_m: [0.0, 0.0, 0.03], orientation: [0.0, 0.0, 0.0, 1.0] };
     let ball = [ToolShape::Ball { center_m: [0.0; 3], radius_m: 0.025 }];
     let mut world =
@@ -109,7 +92,7 @@ fn a_soft_arm_that_is_blocked_pushes_with_its_stiffness_times_what_is_missing() 
 fn a_free_move_is_its_gain_times_as_long_for_both_arms() {
     for name in ["sawyer", "jaco"] {
         let (model, joints) = model(name, vec![EffectConfig::ActuatorGain(ActuatorGain { gain: 1.15 })]);
-        let mut particle = particle(&model, &joints, 0.4);
+        let mut particle = crate::support::particle_ahead(&model, &joints, 0.4);
         let start = model.tool_position_m(&joints)[1];
         model.act(&mut particle, PLUS_Y, &mut rng());
         let way = model.tool_position_m(&particle.state.joints_rad)[1] - start;
@@ -123,7 +106,7 @@ fn play_shortens_a_move_after_a_reversal_alone() {
     for name in ["sawyer", "jaco"] {
         let (loose, joints) = model(name, vec![EffectConfig::Backlash(Backlash { gap_rad })]);
         let (tight, _) = model(name, vec![]);
-        let mut particle = particle(&loose, &joints, 0.4);
+        let mut particle = crate::support::particle_ahead(&loose, &joints, 0.4);
         // The play is in its middle at first: half of it is lost, then nothing, then all of it.
         for (action, lost) in [(PLUS_Y, 0.5 * gap_rad), (PLUS_Y, 0.0), (MINUS_Y, gap_rad), (MINUS_Y, 0.0)] {
             let before = particle.clone();
@@ -149,7 +132,8 @@ fn a_delayed_command_arrives_in_the_end_and_is_felt_later() {
         let (late, joints) = model(name, vec![EffectConfig::ActuationDelay(ActuationDelay { delay_secs })]);
         let (plain, _) = model(name, vec![]);
         // Free: the same place.
-        let (mut first, mut second) = (particle(&late, &joints, 0.4), particle(&plain, &joints, 0.4));
+        let (mut first, mut second) =
+            (crate::support::particle_ahead(&late, &joints, 0.4), crate::support::particle_ahead(&plain, &joints, 0.4));
         late.act(&mut first, PLUS_Y, &mut rng());
         plain.act(&mut second, PLUS_Y, &mut rng());
         let (a, b) = (&first.state.joints_rad, &second.state.joints_rad);
@@ -160,10 +144,10 @@ fn a_delayed_command_arrives_in_the_end_and_is_felt_later() {
     let (plain, _) = model("sawyer", vec![]);
     let ahead_m = (0..200)
         .map(|i| 0.001 * f64::from(i))
-        .find(|ahead_m| plain.check(&particle(&plain, &joints, *ahead_m)).is_ok())
+        .find(|ahead_m| plain.check(&crate::support::particle_ahead(&plain, &joints, *ahead_m)).is_ok())
         .expect("a place ahead of the tool");
     let play = |model: &PushModel| {
-        let mut particle = particle(model, &joints, ahead_m + 0.02);
+        let mut particle = crate::support::particle_ahead(model, &joints, ahead_m + 0.02);
         let before = particle.state.object.position_m[1];
         model.act(&mut particle, PLUS_Y, &mut rng());
         (particle.force[..3].iter().map(|f| f.abs()).fold(0.0, f64::max), particle.state.object.position_m[1] - before)
@@ -178,7 +162,7 @@ fn joints_with_friction_lag_by_torque_over_stiffness() {
     let servo = ServoConfig { stiffness_nmprad: 2000.0, damping_ratio: 1.0 };
     let (plain, joints) = model("sawyer", vec![]);
     let friction = JointFriction { viscous_nmsprad: 1.0, coulomb_nm: 2.0 };
-    let particle = particle(&plain, &joints, 3.0);
+    let particle = crate::support::particle_ahead(&plain, &joints, 3.0);
     let at = |effects: &[Box<dyn physics_model::effect::Effect>]| {
         let base_from_tool = plain.robot().base_from_tool(&joints);
         let q = base_from_tool.rotation;
@@ -204,7 +188,7 @@ fn a_payload_weighs_at_the_wrist_and_on_the_joints() {
     for name in ["sawyer", "jaco"] {
         let (loaded, joints) = model(name, vec![EffectConfig::WristPayload(payload.clone())]);
         let (plain, _) = model(name, vec![]);
-        let mut with = particle(&loaded, &joints, 0.4);
+        let mut with = crate::support::particle_ahead(&loaded, &joints, 0.4);
         let mut without = with.clone();
         loaded.initial_observation(&mut with, &mut rng());
         plain.initial_observation(&mut without, &mut rng());
@@ -227,7 +211,7 @@ fn a_payload_weighs_at_the_wrist_and_on_the_joints() {
 fn a_drift_goes_on_from_action_to_action() {
     let drift = ForceDrift { drift_x_nps: 0.0, drift_y_nps: 0.0, drift_z_nps: 0.02 };
     let (model, joints) = model("sawyer", vec![EffectConfig::ForceDrift(drift)]);
-    let mut particle = particle(&model, &joints, 0.4);
+    let mut particle = crate::support::particle_ahead(&model, &joints, 0.4);
     model.initial_observation(&mut particle, &mut rng());
     assert_eq!(particle.force, [0.0; 6]);
     for action in 0..3 {
@@ -243,7 +227,7 @@ fn a_drift_goes_on_from_action_to_action() {
 #[test]
 fn a_rolling_sphere_is_read_where_it_was() {
     let (model, joints) = model("sawyer", vec![EffectConfig::PoseDelay(PoseDelay { delay_secs: 0.04 })]);
-    let mut particle = particle(&model, &joints, 0.0);
+    let mut particle = crate::support::particle_ahead(&model, &joints, 0.0);
     particle.theta.object = ObjectTheta {
         shape: ObjectShape::Sphere,
         mass_kg: 0.5,
@@ -267,7 +251,8 @@ fn an_arm_with_friction_is_a_dynamic_one_or_has_torque_sensors() {
     let (rough, joints) = model("jaco", vec![friction]);
     let (plain, _) = model("jaco", vec![]);
     assert_eq!(rough.config().arm, ArmConfig::Kinematic);
-    let (mut first, mut second) = (particle(&rough, &joints, 0.4), particle(&plain, &joints, 0.4));
+    let (mut first, mut second) =
+        (crate::support::particle_ahead(&rough, &joints, 0.4), crate::support::particle_ahead(&plain, &joints, 0.4));
     rough.act(&mut first, PLUS_Y, &mut rng());
     plain.act(&mut second, PLUS_Y, &mut rng());
     for (j, start) in joints.iter().enumerate() {

@@ -19,16 +19,9 @@ const MINUS_Y: usize = 6;
 fn particle(model: &PushModel, joints: &[f64], y_m: f64) -> Particle {
     let config = model.config();
     let (x, table) = (config.task.tool_start_m[0], config.world.table_height_m);
-    let object = ObjectTheta {
-        shape: ObjectShape::Box,
-        mass_kg: 0.5,
-        com_m: [0.0; 3],
-        friction: 0.4,
-        size_m: [0.08, 0.08, 0.1],
-    };
     Particle::new(
         State { joints_rad: joints.to_vec(), object: BodyState::at_rest([x, y_m, table + 0.05], 0.0), obstacle: None },
-        Theta { object, obstacle: None, effects: vec![] },
+        Theta { object: crate::support::usual_box(), obstacle: None, effects: vec![] },
     )
 }
 

@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use physics_model::config::{ArmConfig, ObstacleMobility, WorldConfig};
 use physics_model::robot::{Robot, RobotConfig};
+use physics_model::{BodyState, ObjectShape, ObjectTheta, Theta};
 use push_task::config::{
     ForceSensing, GoalConfig, NoiseConfig, PerturbConfig, ReachConfig, RewardConfig, SensorConfig, TaskConfig,
     TransitionNoise,
 };
-use push_task::{PushConfig, PushModel};
+use push_task::{Particle, PushConfig, PushModel, State};
 
 fn root() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_path_buf()
@@ -85,4 +86,19 @@ pub(crate) fn model(arm: &str, mobility: ObstacleMobility) -> (PushModel, Vec<f6
     let model = PushModel::new(push, robot);
     let joints = model.joints_for(&config.home_rad, tool_start_m).unwrap();
     (model, joints)
+}
+
+/// A box of 8 by 8 by 10 cm.
+pub(crate) fn usual_box() -> ObjectTheta {
+    ObjectTheta { shape: ObjectShape::Box, mass_kg: 0.5, com_m: [0.0; 3], friction: 0.4, size_m: [0.08, 0.08, 0.1] }
+}
+
+/// The usual box, `ahead_m` before the tool along +y.
+pub(crate) fn particle_ahead(model: &PushModel, joints: &[f64], ahead_m: f64) -> Particle {
+    let [x, y, _] = model.tool_position_m(joints);
+    let body = BodyState::at_rest([x, y + ahead_m, model.config().world.table_height_m + 0.05], 0.0);
+    Particle::new(
+        State { joints_rad: joints.to_vec(), object: body, obstacle: None },
+        Theta { object: usual_box(), obstacle: None, effects: vec![] },
+    )
 }
