@@ -18,7 +18,8 @@ pub const PAGE: &str = "crates/physics-model/src/accuracy.md";
 const OUTLIER: (f64, f64, f64) = (2.0, 3.0, 0.2);
 
 /// Time bases shown beside the scenario's: control steps, solver iterations.
-const TIME_BASES: [(u32, u32); 8] = [(20, 1), (20, 2), (20, 3), (20, 4), (20, 8), (10, 4), (40, 1), (80, 4)];
+const TIME_BASES: [(u32, u32); 10] =
+    [(20, 1), (20, 2), (20, 3), (20, 4), (20, 8), (10, 2), (10, 3), (10, 4), (40, 1), (80, 4)];
 
 /// Medians and 90th percentiles over the scenes.
 #[derive(Clone, Copy, Debug, PartialEq)]

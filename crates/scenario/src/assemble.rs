@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use physics_model::robot::Robot;
 use pomdp::Rng;
-use push_task::config::ForceSensing;
+use push_task::config::{ForceSensing, PushConfig};
 use push_task::{Observation, Particle, PushModel, WorldDistribution};
 
 use crate::schema::InitialObstacle;
@@ -18,8 +18,10 @@ pub struct Problem {
     pub scenario: Scenario,
     /// The true world's simulator.
     pub truth: PushModel,
-    /// The model that plans and filters.
+    /// The model that filters.
     pub model: PushModel,
+    /// The same in the time steps of the search.
+    pub search: PushModel,
     /// Where worlds come from.
     pub worlds: WorldDistribution,
     /// Where first beliefs come from.
@@ -49,7 +51,11 @@ impl Problem {
         }
         let (arm, effects) = (&scenario.arm, &scenario.effects);
         let truth = PushModel::new(scenario.push_config(&arm.truth, &effects.truth), Arc::clone(&robot));
-        let model = PushModel::new(scenario.push_config(&arm.model, &effects.model), robot);
+        let config = scenario.push_config(&arm.model, &effects.model);
+        let model = PushModel::new(config.clone(), Arc::clone(&robot));
+        let steps = scenario.agent.search_steps;
+        let search_world = steps.map_or_else(|| config.world.clone(), |steps| steps.of(&config.world));
+        let search = PushModel::new(PushConfig { world: search_world, ..config }, robot);
         let start = scenario.task.tool_start_m;
         let start_joints_rad = truth.joints_for(&scenario.robot.home_rad, start).ok_or_else(|| Error::Task {
             name: scenario.name.clone(),
@@ -62,7 +68,7 @@ impl Problem {
         if scenario.initial_belief.obstacle == InitialObstacle::None {
             beliefs.obstacle.shape = [0.0, 0.0, 0.0, 1.0];
         }
-        Ok(Self { scenario: scenario.clone(), truth, model, worlds, beliefs, start_joints_rad })
+        Ok(Self { scenario: scenario.clone(), truth, model, search, worlds, beliefs, start_joints_rad })
     }
 
     /// Draws a true world.
@@ -114,5 +120,31 @@ impl Problem {
             name: self.scenario.name.clone(),
             problem: "distribution: expected worlds without overlap, a thousand draws in a row had one".into(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Selection;
+
+    #[test]
+    fn the_search_has_the_world_in_steps_of_its_own() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let problem = |preset: &str| {
+            let scenario = Selection { preset: preset.into(), ..Selection::new(&root) }.load().unwrap();
+            Problem::assemble(&scenario, &root).unwrap()
+        };
+        let paper = problem("paper");
+        assert_eq!(paper.search.config(), paper.model.config());
+
+        let surmise = problem("surmise");
+        let (search, model) = (surmise.search.config(), surmise.model.config());
+        let duration_secs =
+            |config: &PushConfig| config.world.control_period_secs * f64::from(config.world.control_steps);
+        assert!((duration_secs(search) - duration_secs(model)).abs() < 1e-12);
+        assert!(search.world.control_steps < model.world.control_steps);
+        let same_steps = PushConfig { world: model.world.clone(), ..search.clone() };
+        assert_eq!(&same_steps, model);
     }
 }

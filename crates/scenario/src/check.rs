@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use physics_model::EffectKind;
 
-use crate::schema::{Scenario, VERSION};
+use crate::schema::{Scenario, SearchSteps, VERSION};
 
 impl Scenario {
     /// What is wrong with the values, if anything: key and expectation.
@@ -70,6 +70,21 @@ impl Scenario {
             (share(w.obstacle_friction), "world.obstacle_friction", "0 to 1", &w.obstacle_friction),
             (share(w.restitution), "world.restitution", "0 to 1", &w.restitution),
         ])
+        .or_else(|| {
+            let steps = self.agent.search_steps?;
+            let SearchSteps { control_steps, solver_iterations } = &steps;
+            let period = steps.of(w).control_period_secs;
+            first([
+                ((1..=10_000).contains(control_steps), "agent.search_steps.control_steps", "1 to 10000", control_steps),
+                (
+                    (1..=1000).contains(solver_iterations),
+                    "agent.search_steps.solver_iterations",
+                    "1 to 1000",
+                    solver_iterations,
+                ),
+                (period <= 0.1, "agent.search_steps.control_steps", "control steps of 0.1 s at most", &period),
+            ])
+        })
     }
 
     fn task_problem(&self) -> Option<String> {

@@ -32,5 +32,5 @@ pub use load::{PRESET, Selection, find_root, project_root};
 pub use provenance::commit;
 pub use schema::{
     AgentConfig, ArmsConfig, BeliefConfig, DataConfig, EffectsConfig, EvaluationConfig, Filter, InitialBeliefConfig,
-    InitialObstacle, Published, Rollouts, Scenario, VERSION,
+    InitialObstacle, Published, Rollouts, Scenario, SearchSteps, VERSION,
 };

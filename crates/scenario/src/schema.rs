@@ -154,6 +154,30 @@ pub struct AgentConfig {
     pub proposals: usize,
     /// Default policy of the search's simulations.
     pub rollouts: Rollouts,
+    /// Time steps of the worlds that the search simulates. Without this key they are those of `world`, by which the belief is updated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search_steps: Option<SearchSteps>,
+}
+
+/// In how many steps an action is simulated. It lasts as long as the one of `world`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SearchSteps {
+    /// Control steps of an action.
+    pub control_steps: u32,
+    /// Solver iterations (substeps) in a control step.
+    pub solver_iterations: u32,
+}
+
+impl SearchSteps {
+    /// The time base of a world, in these steps.
+    #[must_use]
+    pub fn of(self, world: &WorldConfig) -> WorldConfig {
+        let Self { control_steps, solver_iterations } = self;
+        let duration_secs = world.control_period_secs * f64::from(world.control_steps);
+        let control_period_secs = duration_secs / f64::from(control_steps);
+        WorldConfig { control_steps, control_period_secs, solver_iterations, ..world.clone() }
+    }
 }
 
 /// Default policy of simulations.

@@ -26,12 +26,12 @@ impl<'a> Searcher<'a> {
     /// Searches from a belief.
     pub(crate) fn decide(&mut self, belief: &Particles<Particle>, remaining: usize) -> Decision {
         let policy = default_policy(self.problem);
-        let report = self.search.search(&self.problem.model, belief, policy, remaining, &mut self.rng);
+        let report = self.search.search(&self.problem.search, belief, policy, remaining, &mut self.rng);
         Decision { action: report.action, search: Some(report) }
     }
 
     /// Keeps the branch that happened.
     pub(crate) fn prune(&mut self, action: Action, observation: &Observation) {
-        self.search.prune(&action, &self.problem.model.key(observation));
+        self.search.prune(&action, &self.problem.search.key(observation));
     }
 }
