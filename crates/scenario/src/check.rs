@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use physics_model::EffectKind;
 
-use crate::schema::{Scenario, SearchSteps, VERSION};
+use crate::schema::{LONGEST_PERIOD_SECS, Scenario, SearchSteps, VERSION};
 
 impl Scenario {
     /// What is wrong with the values, if anything: key and expectation.
@@ -53,7 +53,12 @@ impl Scenario {
         let w = &self.world;
         let period = w.control_period_secs;
         first([
-            (positive(period) && period <= 0.1, "world.control_period_secs", "above 0 and at most 0.1 s", &period),
+            (
+                positive(period) && period <= LONGEST_PERIOD_SECS,
+                "world.control_period_secs",
+                "above 0 and at most 0.1 s",
+                &period,
+            ),
             ((1..=10_000).contains(&w.control_steps), "world.control_steps", "1 to 10000", &w.control_steps),
             ((1..=1000).contains(&w.solver_iterations), "world.solver_iterations", "1 to 1000", &w.solver_iterations),
             (positive(w.contact_frequency_hz), "world.contact_frequency_hz", "above 0 Hz", &w.contact_frequency_hz),
@@ -71,18 +76,11 @@ impl Scenario {
             (share(w.restitution), "world.restitution", "0 to 1", &w.restitution),
         ])
         .or_else(|| {
-            let steps = self.agent.search_steps?;
-            let SearchSteps { control_steps, solver_iterations } = &steps;
-            let period = steps.of(w).control_period_secs;
+            let SearchSteps { world_steps, solver_iterations } = self.agent.search_steps?;
+            let good = (1..=1000).contains(&solver_iterations);
             first([
-                ((1..=10_000).contains(control_steps), "agent.search_steps.control_steps", "1 to 10000", control_steps),
-                (
-                    (1..=1000).contains(solver_iterations),
-                    "agent.search_steps.solver_iterations",
-                    "1 to 1000",
-                    solver_iterations,
-                ),
-                (period <= 0.1, "agent.search_steps.control_steps", "control steps of 0.1 s at most", &period),
+                ((1..=100).contains(&world_steps), "agent.search_steps.world_steps", "1 to 100", &world_steps),
+                (good, "agent.search_steps.solver_iterations", "1 to 1000", &solver_iterations),
             ])
         })
     }

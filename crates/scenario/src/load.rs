@@ -361,15 +361,11 @@ mod tests {
             ("robot.locked_joints.head_pan=inf", "robot: expected finite numbers in home_rad"),
             ("robot.urdf=\"a\\tb.urdf\"", "robot.urdf: expected a path without control characters"),
             (
-                "agent.search_steps={ control_steps = 0, solver_iterations = 2 }",
-                "agent.search_steps.control_steps: expected 1 to 10000, found 0",
+                "agent.search_steps={ world_steps = 0, solver_iterations = 2 }",
+                "agent.search_steps.world_steps: expected 1 to 100, found 0",
             ),
             (
-                "agent.search_steps={ control_steps = 3, solver_iterations = 2 }",
-                "agent.search_steps.control_steps: expected control steps of 0.1 s at most, found 0.111",
-            ),
-            (
-                "agent.search_steps={ control_steps = 10, solver_iterations = 0 }",
+                "agent.search_steps={ world_steps = 2, solver_iterations = 0 }",
                 "agent.search_steps.solver_iterations: expected 1 to 1000, found 0",
             ),
         ];

@@ -154,29 +154,35 @@ pub struct AgentConfig {
     pub proposals: usize,
     /// Default policy of the search's simulations.
     pub rollouts: Rollouts,
-    /// Time steps of the worlds that the search simulates. Without this key they are those of `world`, by which the belief is updated.
+    /// Time steps of the worlds that the search simulates. Without this key they are those of `world`, by which the belief is updated. So they are where the
+    /// model's arm does not follow its commands exactly: a dynamic arm, effects on commands, effects of unknown strength.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search_steps: Option<SearchSteps>,
 }
 
-/// In how many steps an action is simulated. It lasts as long as the one of `world`.
+/// In which steps the search simulates an action, which lasts as long as in `world`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SearchSteps {
-    /// Control steps of an action.
-    pub control_steps: u32,
-    /// Solver iterations (substeps) in a control step.
+    /// Control steps of `world` that one of the search takes the place of, as long as that takes 0.1 s at most.
+    #[schemars(range(min = 1, max = 100))]
+    pub world_steps: u32,
+    /// Solver iterations (substeps) in a control step of the search.
+    #[schemars(range(min = 1, max = 1000))]
     pub solver_iterations: u32,
 }
 
+/// Longest control step, s: that of `world.control_period_secs`, too.
+pub(crate) const LONGEST_PERIOD_SECS: f64 = 0.1;
+
 impl SearchSteps {
     /// The time base of a world, in these steps.
-    #[must_use]
-    pub fn of(self, world: &WorldConfig) -> WorldConfig {
-        let Self { control_steps, solver_iterations } = self;
+    pub(crate) fn of(self, world: &WorldConfig) -> WorldConfig {
         let duration_secs = world.control_period_secs * f64::from(world.control_steps);
+        let least = (duration_secs / LONGEST_PERIOD_SECS - 1e-9).ceil().max(1.0) as u32;
+        let control_steps = world.control_steps.div_ceil(self.world_steps).max(least);
         let control_period_secs = duration_secs / f64::from(control_steps);
-        WorldConfig { control_steps, control_period_secs, solver_iterations, ..world.clone() }
+        WorldConfig { control_steps, control_period_secs, solver_iterations: self.solver_iterations, ..world.clone() }
     }
 }
 
