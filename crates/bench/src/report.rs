@@ -76,12 +76,7 @@ pub fn page(root: &Path, world: &WorldConfig) -> Result<String> {
         scenes.len()
     );
     for (steps, iterations) in TIME_BASES {
-        let base = WorldConfig {
-            control_steps: steps,
-            control_period_secs: world.control_period_secs * f64::from(world.control_steps) / f64::from(steps),
-            solver_iterations: iterations,
-            ..world.clone()
-        };
+        let base = world.in_steps(steps, iterations);
         let chosen = (steps, iterations) == (world.control_steps, world.solver_iterations);
         let mark = if chosen { "**" } else { "" };
         page += &row(&format!("{mark}{steps} × {iterations}{mark}"), &errors(&base));

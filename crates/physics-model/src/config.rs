@@ -43,6 +43,15 @@ pub struct WorldConfig {
     pub obstacle_mobility: ObstacleMobility,
 }
 
+impl WorldConfig {
+    /// The same world, whose actions last as long in other steps.
+    #[must_use]
+    pub fn in_steps(&self, control_steps: u32, solver_iterations: u32) -> Self {
+        let control_period_secs = self.control_period_secs * f64::from(self.control_steps) / f64::from(control_steps);
+        Self { control_period_secs, control_steps, solver_iterations, ..self.clone() }
+    }
+}
+
 /// How the arm follows its commands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]

@@ -180,9 +180,7 @@ impl SearchSteps {
     pub(crate) fn of(self, world: &WorldConfig) -> WorldConfig {
         let duration_secs = world.control_period_secs * f64::from(world.control_steps);
         let least = (duration_secs / LONGEST_PERIOD_SECS - 1e-9).ceil().max(1.0) as u32;
-        let control_steps = world.control_steps.div_ceil(self.world_steps).max(least);
-        let control_period_secs = duration_secs / f64::from(control_steps);
-        WorldConfig { control_steps, control_period_secs, solver_iterations: self.solver_iterations, ..world.clone() }
+        world.in_steps(world.control_steps.div_ceil(self.world_steps).max(least), self.solver_iterations)
     }
 }
 
