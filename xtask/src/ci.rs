@@ -17,6 +17,10 @@ const SKIPPED_FILE: &str = "SURMISE_SKIPPED";
 /// With the value 1: nothing may be skipped.
 const REQUIRE_ALL: &str = "SURMISE_REQUIRE_ALL";
 
+/// Tests run beside each other, and threads of several programs that wait for work take turns on the same cores. What threads must not change is tested with
+/// counts of its own.
+const ONE_THREAD: (&str, &str) = ("RAYON_NUM_THREADS", "1");
+
 const CHECKS: [&[&str]; 3] = [
     &["fmt", "--all", "--check"],
     &["clippy", "--release", "--workspace", "--all-targets", "--", "--deny", "warnings"],
@@ -85,7 +89,7 @@ fn passes(root: &Path, step: &[&str]) -> Result<bool> {
     program::say!("cargo {}", step.join(" "));
     let started = Instant::now();
     let mut command: Command = cargo(root);
-    command.args(step).env(BUILT, "1").env(SKIPPED_FILE, root.join(SKIPPED));
+    command.args(step).env(BUILT, "1").env(SKIPPED_FILE, root.join(SKIPPED)).env(ONE_THREAD.0, ONE_THREAD.1);
     let passed = command.status().context("cannot run cargo")?.success();
     program::say!("cargo {}: {:.0} s", step[0], started.elapsed().as_secs_f64());
     Ok(passed)
