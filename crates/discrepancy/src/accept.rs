@@ -132,7 +132,7 @@ mod tests {
     use nalgebra::DVector;
 
     use super::*;
-    use crate::likelihood::episode_cost;
+    use crate::likelihood::cell_cost;
     use crate::model::Model;
 
     /// A fit that leaves residuals of this size in each of four episodes.
@@ -144,7 +144,7 @@ mod tests {
     /// Two held-out episodes with residuals of this size.
     fn left_of(size: f64) -> Heldout {
         let square = 20.0 * size * size;
-        Heldout { squares: vec![square; 2], costs: vec![episode_cost(square, 20); 2] }
+        Heldout { squares: vec![square; 2], costs: vec![cell_cost(square, 20); 2] }
     }
 
     /// A round that finds `found` beside `base` in what was fitted, and as much in two held-out episodes.

@@ -248,7 +248,7 @@ pub(crate) fn promise_known(part: &Study, base: &Fit, mut promises: Vec<Promise>
         let gain = gained * promise.episodes as f64 / part.chosen.len() as f64;
         if gain > promise.gain {
             promise.gain = gain;
-            promise.start = Some(Start { clocks: base.x[..base.model.clocks].to_vec(), own: own.to_vec() });
+            promise.start = Some(Start { shared: Vec::new(), own: own.to_vec() });
         }
     }
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -267,8 +267,8 @@ fn simulated(part: &Study, model: &Model, x: Vec<f64>) -> Place {
     Place { cost: cost(&x, &part.white(&raw, model.engine_errors(&x))), x, raw }
 }
 
-/// The linear step of the screening as far as it helps: large effects are not linear.
-pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) -> Begin {
+/// The linear step of the screening as far as it helps: large effects are not linear. `stated`: where the screening began, if not at `base`.
+pub(crate) fn begin(part: &Study, base: &Fit, stated: Option<&Fit>, model: &Model, promise: &Promise) -> Begin {
     let at = |share: f64| -> Vec<f64> {
         let own = promise.begin.iter().map(|a| if promise.candidate.begin.is_some() { *a } else { share * a });
         base.x.iter().copied().chain(own).collect()
@@ -294,7 +294,7 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     }
     if let Some(start) = &promise.start {
         let mut x = [base.x.as_slice(), &start.own].concat();
-        x[..start.clocks.len()].copy_from_slice(&start.clocks);
+        x[..start.shared.len()].copy_from_slice(&start.shared);
         tried.push(simulated(x));
     }
     // From a border, where a strength may have no more effect, a fit does not find back.
@@ -333,7 +333,10 @@ pub(crate) fn begin(part: &Study, base: &Fit, model: &Model, promise: &Promise) 
     tried.extend(in_place(part, base, &promise.candidate).into_iter().map(simulated));
     let best = tried.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     let Place { mut x, raw, .. } = best.unwrap_or_else(|| simulated(at(0.0)));
-    let mut jacobian = base.jacobian.clone();
+    // Derivatives of what is nearer.
+    let far = |from: &Fit| -> f64 { from.x.iter().zip(&x).take(model.tunables).map(|(a, b)| (a - b).powi(2)).sum() };
+    let nearer = stated.filter(|stated| far(stated) < far(base)).unwrap_or(base);
+    let mut jacobian = nearer.jacobian.clone();
     // A clock that gives way is not skewed, and changes nothing.
     for clock in part.simulator.nominal.replaced_by(promise.candidate.kind()) {
         x[clock] = 0.0;

@@ -41,8 +41,8 @@ use crate::verdict::{Decided, decide};
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
 
-/// What the search leaves to the screening, in simulations of each of its episodes: about as many as the catalogue has strengths and places, and half as many again for scans.
-const SCREENED: usize = 130;
+/// What the search leaves to the screening, in simulations of each of its episodes: about as many as the catalogue has strengths and places, and two thirds as many again for scans.
+const SCREENED: usize = 145;
 /// The same of what is thrown: fewer effects show.
 const SCREENED_THROWN: usize = 40;
 /// Kinds of which the first of several effects of what is thrown is chosen: each further one costs what a further effect does.
@@ -271,7 +271,7 @@ fn diagnose_among(
     // The null hypothesis: re-tuning alone. Its errors are learnt near where it fits, then it is fitted again: in the search to all episodes, with care
     // where nothing explains much more.
     let study = Study::new(&simulator, engine, fitted);
-    let (null, part, places) = null_model(&study);
+    let NullModel { null, stated, part, places } = null_model(&study);
     if !null.log_evidence().is_finite() {
         return Err(no_numbers(name));
     }
@@ -282,7 +282,7 @@ fn diagnose_among(
     let before = simulator.rollouts() + screened * part.rollouts();
     let limits = [settings.rollouts, settings.most, settings.limit];
     let budget = Budget::new(limits.map(|limit| limit.saturating_sub(before)));
-    let screening = Screening::new(&part, places, &null, &catalogue(&context));
+    let screening = Screening::new(&part, places, &null, stated, &catalogue(&context));
     let [study, kept, part] =
         [study, Study::new(&simulator, engine, choosing), part].map(|study| study.within(&budget));
     let reported = reported.map(|reported| Study::new(&simulator, engine, reported).within(&budget));
@@ -392,9 +392,21 @@ fn conclude(
     Ok(diagnosis)
 }
 
-/// The null hypothesis, re-tuned, and the episodes of the screening, with errors learnt near it.
-fn null_model<'a>(study: &Study<'a>) -> (Fit, Study<'a>, Vec<usize>) {
-    let (tunables, clocks) = (study.simulator.nominal.tunables.len(), study.simulator.nominal.clocks());
+/// The null hypothesis.
+struct NullModel<'a> {
+    /// Re-tuned in the episodes of the screening.
+    null: Fit,
+    /// As the log states it, but for the clocks; `None` of what is thrown.
+    stated: Option<Fit>,
+    /// The episodes of the screening, with errors learnt near where it fits.
+    part: Study<'a>,
+    /// Their places in the study.
+    places: Vec<usize>,
+}
+
+fn null_model<'a>(study: &Study<'a>) -> NullModel<'a> {
+    let nominal = study.simulator.nominal;
+    let (tunables, clocks) = (nominal.tunables.len(), nominal.clocks());
     let mut begin = Hypothesis { z: vec![0.0; tunables], effects: Vec::new() };
     study.set_clocks(&mut begin);
     let first = fit(study, Model::nominal(tunables, 0).with_clocks(clocks), Begin::at(&begin.z), Effort::Quick);
@@ -402,9 +414,13 @@ fn null_model<'a>(study: &Study<'a>) -> (Fit, Study<'a>, Vec<usize>) {
     let mut part = study.part(&places);
     part.learn_errors(&first.model.hypothesis(&first.x));
     let model = Model::nominal(tunables, part.engine_errors()).with_clocks(clocks);
-    let mut x = first.x;
-    x.resize(model.count(), 0.0);
-    (fit(&part, model, Begin::at(&x), Effort::Quick), part, places)
+    let full = |mut x: Vec<f64>| {
+        x.resize(model.count(), 0.0);
+        x
+    };
+    let stated = nominal.has_tool().then(|| Fit::at(&part, model.clone(), full(begin.z)));
+    let null = fit(&part, model.clone(), Begin::at(&full(first.x)), Effort::Full);
+    NullModel { null, stated, part, places }
 }
 
 #[cfg(test)]
@@ -425,7 +441,7 @@ mod tests {
     /// What a report says of a log whose candidates `catalogue` changes, but for what it cost.
     fn answer(log: &Log, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
         let nominal = Nominal::new(&log.header, crate::rig_tool(log, None).unwrap()).unwrap();
-        let short = Settings { rollouts: 1500, most: 1600, limit: 1800, ..Settings::default() };
+        let short = Settings { rollouts: 2000, most: 2100, limit: 2300, ..Settings::default() };
         let settings = Settings { looks: 6, quick_fits: 3, effects: 1, ..short };
         let made = |context: &Context| catalogue(candidates(context));
         let diagnosis = diagnose_among(log, "log", &nominal, &settings, &(), &made).unwrap();

@@ -5,13 +5,16 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::candidate::Candidate;
 use crate::likelihood::{self, Stack, dot, pick, weights};
+use crate::linear::Linear;
 use crate::model::{Model, STEP};
 use crate::study::{Study, difference};
 
 /// Steps between two fresh Jacobians, at most.
 pub(crate) const STEPS: usize = 5;
-/// A fresh Jacobian that gained less than this share of −ln posterior is not followed by another one.
-const LITTLE: f64 = 0.01;
+/// A fresh Jacobian that gained less than this in ln posterior is not followed by another one.
+const SETTLED: f64 = 1.0;
+/// After a step that gains nothing the next one is damped by this at least: less leads to the same place.
+const DAMPED: f64 = 0.1;
 /// A Jacobian is fresh within this many steps of its finite differences.
 const NEAR: f64 = 0.5;
 /// A step that promises less than this in ln posterior is not made.
@@ -39,6 +42,15 @@ impl Fit {
     pub fn new(model: Model, x: Vec<f64>, raw: Vec<Vec<f64>>, residuals: Stack, jacobian: Vec<Stack>) -> Self {
         let log_evidence = log_evidence(&model, &x, &residuals, &jacobian);
         Self { model, x, raw, residuals, jacobian, log_evidence }
+    }
+
+    /// Not fitted: at `x`.
+    #[must_use]
+    pub fn at(study: &Study, model: Model, x: Vec<f64>) -> Self {
+        let raw = study.raw(&model.hypothesis(&x));
+        let residuals = study.white(&raw, model.engine_errors(&x));
+        let jacobian = derivatives(study, &model, &x, (&raw, &residuals));
+        Self::new(model, x, raw, residuals, jacobian)
     }
 
     /// The same as seen by some of the episodes alone.
@@ -134,7 +146,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
     let mut before = f64::INFINITY;
     for round in 0..rounds {
         let now = cost(&x, &residuals);
-        if round > 0 && (!study.has_fits() || (round > 1 && before - now < LITTLE * now)) {
+        if round > 0 && (!study.has_fits() || (round > 1 && before - now < SETTLED)) {
             break;
         }
         before = now;
@@ -149,9 +161,11 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             if !model.parts.is_empty() && !study.affords(simulation) {
                 break;
             }
-            let Some(step) = step(&model, &x, &residuals, &jacobian, damping) else { break };
+            let linear = Linear::new(&residuals, &jacobian.iter().collect::<Vec<_>>());
+            let Some(step) = linear.minimum(&x, |index| model.range(index), damping) else { break };
+            let promise = cost(&x, &residuals) - step.cost;
             // A promise that a fresh Jacobian makes is worth more than one of an old one.
-            if step.promise < WORTHWHILE || (!moved && round > 0 && step.promise < 6.0 * WORTHWHILE) {
+            if promise < WORTHWHILE || (!moved && round > 0 && promise < 6.0 * WORTHWHILE) {
                 break;
             }
             // Broyden's changes by a long step, even one that is not taken, reach farther than a finite difference.
@@ -168,7 +182,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
                 (x, raw, residuals) = (next, found_raw, found);
                 damping = (damping * 0.2).max(1e-6);
             } else {
-                damping = (damping * 20.0).min(1e6);
+                damping = (damping * 20.0).clamp(DAMPED, 1e6);
             }
         }
         if round > 0 && !moved {
@@ -213,67 +227,6 @@ fn complete(study: &Study, model: &Model, x: &[f64], at: (&[Vec<f64>], &Stack), 
         };
         jacobian.push(difference(&white, residuals, step));
     }
-}
-
-struct Step {
-    delta: DVector<f64>,
-    /// What the linear model expects to gain in ln posterior.
-    promise: f64,
-}
-
-/// The damped Gauss–Newton step within the ranges: coordinates that it would push over a border stay there.
-fn step(model: &Model, x: &[f64], residuals: &Stack, jacobian: &[Stack], damping: f64) -> Option<Step> {
-    let n = x.len();
-    let weights = weights(residuals);
-    let product = |a, b| dot(a, b, &weights);
-    let gram = DMatrix::from_fn(n, n, |i, j| product(&jacobian[i], &jacobian[j]) + f64::from(u8::from(i == j)));
-    let slope = DVector::from_fn(n, |i, _| product(&jacobian[i], residuals) + x[i]);
-    let mut free: Vec<usize> = (0..n).collect();
-    let mut delta = DVector::zeros(n);
-    loop {
-        let m = free.len();
-        if m == 0 {
-            return None;
-        }
-        let a = DMatrix::from_fn(m, m, |i, j| {
-            let value = gram[(free[i], free[j])];
-            if i == j { value * (1.0 + damping) } else { value }
-        });
-        // What was held at a border moves the others' optimum.
-        let b = DVector::from_fn(m, |i, _| {
-            let held: f64 = (0..n).filter(|j| !free.contains(j)).map(|j| gram[(free[i], j)] * delta[j]).sum();
-            -(slope[free[i]] + held)
-        });
-        let solution = a.cholesky()?.solve(&b);
-        let mut worst = None;
-        for (i, index) in free.iter().enumerate() {
-            let [low, high] = model.range(*index);
-            let target = x[*index] + solution[i];
-            if target < low || target > high {
-                let over = (low - target).max(target - high);
-                if worst.is_none_or(|(_, _, most)| over > most) {
-                    worst = Some((*index, target.clamp(low, high) - x[*index], over));
-                }
-            }
-        }
-        match worst {
-            Some((index, held, _)) => {
-                delta[index] = held;
-                free.retain(|other| *other != index);
-                if free.is_empty() {
-                    break;
-                }
-            }
-            None => {
-                for (i, index) in free.iter().enumerate() {
-                    delta[*index] = solution[i];
-                }
-                break;
-            }
-        }
-    }
-    let promise = -(slope.dot(&delta) + 0.5 * (delta.transpose() * &gram * &delta)[(0, 0)]);
-    Some(Step { delta, promise })
 }
 
 /// The smallest change of the Jacobian that explains what a step did. What is known exactly is left as it is.

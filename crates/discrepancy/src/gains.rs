@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::DVector;
 
-use crate::likelihood::{Stack, episode_cost};
+use crate::likelihood::{Stack, cell_cost};
 
 /// Octave of wavelets (see [`crate::cells`]) from which errors are slow: those that compare eight blocks with the next eight, and slower ones.
 const SLOW: u32 = 3;
@@ -37,7 +37,7 @@ impl Gains {
         for ((cells, before), (_, after)) in before.by_cell().zip(after.by_cell()) {
             let mut gained = 0.0;
             for (cell, ((without, count), (with, _))) in before.into_iter().zip(after).enumerate() {
-                let gain = episode_cost(without, count) - episode_cost(with, count);
+                let gain = cell_cost(without, count) - cell_cost(with, count);
                 gained += gain;
                 let Some((kind, octave)) = cells.channels.get(cell) else { continue };
                 if kind.is_force() {

@@ -52,6 +52,7 @@ mod gains;
 pub mod heldout;
 pub mod interval;
 pub mod likelihood;
+mod linear;
 pub mod listing;
 pub mod locate;
 pub mod model;

@@ -39,12 +39,17 @@ impl Stack {
     /// −ln p of each episode, but for a constant.
     #[must_use]
     pub fn costs(&self) -> Vec<f64> {
-        self.sums().map(|sums| sums.iter().map(|(chi2, count)| episode_cost(*chi2, *count)).sum()).collect()
+        self.sums().map(|sums| sums.iter().map(|(chi2, count)| cell_cost(*chi2, *count)).sum()).collect()
     }
 
     /// The cells of each episode, and χ² and number of residuals of each cell.
     pub(crate) fn by_cell(&self) -> impl Iterator<Item = (&Cells, Vec<(f64, usize)>)> + '_ {
         self.cells.iter().map(AsRef::as_ref).zip(self.sums())
+    }
+
+    /// The residuals of each episode with its cells, counted.
+    pub(crate) fn episodes(&self) -> impl Iterator<Item = (usize, (&DVector<f64>, &Cells))> + '_ {
+        self.episodes.iter().zip(self.cells.iter().map(AsRef::as_ref)).enumerate()
     }
 
     /// χ² and number of residuals of each cell, episode by episode.
@@ -107,10 +112,18 @@ pub fn cost(stack: &Stack) -> f64 {
 
 /// −ln p of a cell with this sum of squares.
 #[must_use]
-pub fn episode_cost(chi2: f64, count: usize) -> f64 {
+pub(crate) fn cell_cost(chi2: f64, count: usize) -> f64 {
     let n = count as f64;
     let freedom = n.max(LEAST_FREEDOM);
     0.5 * (freedom + n) * (chi2 / freedom).ln_1p()
+}
+
+/// The weight of its residuals in a step of least squares: −ln p has the derivative `weight` · residual.
+#[must_use]
+pub(crate) fn cell_weight(chi2: f64, count: usize) -> f64 {
+    let n = count as f64;
+    let freedom = n.max(LEAST_FREEDOM);
+    (1.0 + n / freedom) / (1.0 + chi2 / freedom)
 }
 
 /// Mean square of residuals.
@@ -142,14 +155,10 @@ pub fn trimmed_mean(mut values: Vec<f64>) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
-/// The weight of each residual in a step of least squares: −ln p has the derivative `weight` · residual.
+/// The weight of each residual, see [`cell_weight`].
 #[must_use]
 pub fn weights(stack: &Stack) -> Vec<DVector<f64>> {
-    let one = |(chi2, count): (f64, usize)| {
-        let n = count as f64;
-        let freedom = n.max(LEAST_FREEDOM);
-        (1.0 + n / freedom) / (1.0 + chi2 / freedom)
-    };
+    let one = |(chi2, count): (f64, usize)| cell_weight(chi2, count);
     (stack.sums().zip(&stack.cells))
         .map(|(sums, cells)| {
             let weights: Vec<f64> = sums.into_iter().map(one).collect();
@@ -176,7 +185,7 @@ mod tests {
 
     #[test]
     fn near_one_it_is_the_normal_likelihood_and_far_out_a_logarithm() {
-        let at = |chi2: f64| episode_cost(chi2, 1000);
+        let at = |chi2: f64| cell_cost(chi2, 1000);
         assert!((at(1001.0) - at(1000.0) - 0.5).abs() < 1e-3);
         // From 100 to 50 standard deviations: n ln 4 instead of 3 750 000.
         assert!((at(1e7) - at(2.5e6) - 1000.0 * 4.0_f64.ln()).abs() < 1.0);

@@ -279,7 +279,13 @@ impl Report {
         widen(&mut samples, &diagnosis.model, unexplained_share(diagnosis), interval_width);
         let effects = effects(diagnosis, &samples);
         let verdict = diagnosis.verdict;
-        let confusion_set = confusion_set(&diagnosis.probabilities, settings.confusion);
+        let ranking = ranking(diagnosis);
+        let mut confusion_set = confusion_set(&diagnosis.probabilities, settings.confusion);
+        if effects.is_empty() {
+            // Of what is not named those that the evidence favours.
+            let favoured = |name: &&str| ranking.iter().any(|rival| rival.name == *name && rival.log_evidence > 0.0);
+            confusion_set.retain(favoured);
+        }
         let summary = summary(verdict, &effects, before, after);
         let description = diagnosis.is_open().then(|| describe(diagnosis));
         Self {
@@ -299,7 +305,7 @@ impl Report {
                 diagnosis.contact_gap.as_ref().and_then(ContactGap::next_experiment),
             ),
             confusion_set,
-            ranking: ranking(diagnosis),
+            ranking,
             located: diagnosis.located.clone(),
             remaining: diagnosis.remaining.clone(),
             description,

@@ -1,17 +1,21 @@
 //! Which effects could explain what the re-tuned nominal model leaves.
 //!
-//! For each candidate a linear step, measured near the nominal model, and a scan of its strengths over what is plausible: what rolls, slides off or meets
-//! a tool elsewhere is no multiple of what a slight effect does. Clocks are set anew at each point of a scan, which costs no simulation: without the effect they
-//! may have been re-tuned to stand for it.
+//! For each candidate a linear step, and a scan of its strengths over what is plausible: what rolls, slides off or meets a tool elsewhere is no multiple
+//! of what a slight effect does. At each point of a scan clocks are set anew, and everything else is re-tuned as if residuals were linear, which costs no
+//! simulation.
+//!
+//! Both begin where the log says, not where re-tuning has led: that may have made up for what is missing, and then nothing like it shows.
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use physics_model::EffectKind;
 
 use crate::candidate::Candidate;
-use crate::fit::{Fit, cost};
-use crate::likelihood::{self, Stack, dot, pick, weights};
+use crate::fit::Fit;
+use crate::likelihood::{self, Stack, pick};
+use crate::linear::{Linear, Minimum};
+use crate::model::Model;
 use crate::study::{Study, difference};
 
 /// Episodes that the screening looks at, at most.
@@ -41,17 +45,17 @@ pub struct Promise {
     pub episodes: usize,
     /// Coordinates to begin a fit from.
     pub begin: Vec<f64>,
-    /// By how much the coordinates of the model without it would move then.
+    /// By how much the coordinates of the model without it would move then; 0 with such a start.
     pub beside: Vec<f64>,
-    /// The best point of the scan, if it gains anything.
+    /// The best point of the scan, if it gains anything, or where the linear step leads, if it does not begin where re-tuning has led.
     pub(crate) start: Option<Start>,
 }
 
 /// Where a fit may begin.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Start {
-    /// Coordinates of the clocks.
-    pub(crate) clocks: Vec<f64>,
+    /// The first coordinates of the model without the candidate, as many as differ from where that is.
+    pub(crate) shared: Vec<f64>,
     /// Those of the candidate.
     pub(crate) own: Vec<f64>,
 }
@@ -64,6 +68,8 @@ pub struct Screening {
     /// Which of those are scanned.
     scanned: Vec<usize>,
     screened: Vec<Screened>,
+    /// Where the first effect is looked for, if not where re-tuning has led.
+    pub(crate) stated: Option<Fit>,
 }
 
 #[derive(Debug)]
@@ -85,14 +91,17 @@ enum Columns {
 /// A point of a scan, with the changes of residuals there.
 #[derive(Debug)]
 struct Point {
-    start: Start,
+    clocks: Vec<f64>,
+    own: Vec<f64>,
     change: Vec<Vec<f64>>,
 }
 
 impl Screening {
-    /// Simulates every candidate near the re-tuned nominal model in the episodes of `part`, which are those at `places` of all.
+    /// Simulates every candidate beside the nominal model in the episodes of `part`, which are those at `places` of all: as the log states it, or else as
+    /// re-tuned, `null`.
     #[must_use]
-    pub fn new(part: &Study, places: Vec<usize>, nominal: &Fit, candidates: &[Candidate]) -> Self {
+    pub fn new(part: &Study, places: Vec<usize>, null: &Fit, stated: Option<Fit>, candidates: &[Candidate]) -> Self {
+        let nominal = stated.as_ref().unwrap_or(null);
         let hypothesis = nominal.model.hypothesis(&nominal.x);
         let base = part.raw(&hypothesis);
         let scanned = spread(nominal, &part.groups(), SCANNED);
@@ -119,65 +128,87 @@ impl Screening {
         };
         let before: Vec<Vec<f64>> = scanned.iter().map(|place| base[*place].clone()).collect();
         let has_tool = part.simulator.nominal.has_tool();
-        let points =
-            |candidate: &Candidate| if has_tool { scan(&few, &before, nominal, candidate) } else { Vec::new() };
+        let tuning: Vec<Stack> = nominal.jacobian.iter().map(|column| pick(column, &scanned)).collect();
+        let points = |candidate: &Candidate| {
+            if has_tool { scan(&few, &before, nominal, &tuning, candidate) } else { Vec::new() }
+        };
         let one = |candidate: &Candidate| Screened {
             columns: columns(candidate),
             points: points(candidate),
             candidate: candidate.clone(),
         };
         let screened = candidates.iter().map(one).collect();
-        Self { places, scanned, screened }
+        Self { places, scanned, screened, stated }
     }
 
     /// What each candidate would bring in so many episodes beside what `fit` has; the most promising first. `part` and `fit` know the episodes of the
     /// screening alone.
     #[must_use]
     pub fn promises(&self, part: &Study, fit: &Fit, episodes: usize) -> Vec<Promise> {
-        let Fit { model, x, raw, residuals, jacobian: tuning, .. } = fit;
-        let moved = |change: &Vec<Vec<f64>>| -> Stack { part.white(&plus(raw.iter(), change), model.engine_errors(x)) };
+        let stated = self.stated.as_ref().filter(|_| fit.model.parts.is_empty());
+        let Fit { model, x, raw, residuals, jacobian: tuning, .. } = stated.unwrap_or(fit);
+        let moved = |Fit { model, x, raw, .. }: &Fit, change: &Vec<Vec<f64>>| -> Stack {
+            part.white(&plus(raw.iter(), change), model.engine_errors(x))
+        };
         let few = part.part(&self.scanned);
-        let before = cost(x, &pick(residuals, &self.scanned));
+        let mut tuning_of_few: Vec<Stack> = tuning.iter().map(|column| pick(column, &self.scanned)).collect();
+        let before = retuned(model, x, &pick(residuals, &self.scanned), &tuning_of_few);
         // Beside another effect changes are taken to add up.
-        let best = |points: &[Point]| -> Option<(f64, Start)> {
-            let gain = |point: &Point| {
+        let mut best = |candidate: &Candidate, points: &[Point]| -> Option<(f64, Start)> {
+            let before = before.as_ref()?.cost;
+            let kept = without_clocks(part, candidate, &mut tuning_of_few);
+            let gain = |point: &Point| -> Option<(f64, Start)> {
                 let raw = plus(self.scanned.iter().map(|place| &raw[*place]), &point.change);
-                let mut x = x.clone();
-                x[..point.start.clocks.len()].copy_from_slice(&point.start.clocks);
-                let white = few.white(&raw, model.engine_errors(&x));
-                x.extend(&point.start.own);
-                before - cost(&x, &white)
+                let mut shared = x.clone();
+                shared[..point.clocks.len()].copy_from_slice(&point.clocks);
+                let white = few.white(&raw, model.engine_errors(&shared));
+                let again = retuned(model, &shared, &white, &tuning_of_few)?;
+                shared.iter_mut().zip(again.delta.iter()).for_each(|(x, d)| *x += d);
+                Some((before - again.cost - prior(&point.own), Start { shared, own: point.own.clone() }))
             };
-            let gains = points.iter().map(|point| (gain(point), point.start.clone()));
-            gains.filter(|(gain, _)| *gain > 0.0).max_by(|a, b| a.0.total_cmp(&b.0))
+            let best =
+                points.iter().filter_map(gain).filter(|(gain, _)| *gain > 0.0).max_by(|a, b| a.0.total_cmp(&b.0));
+            kept.into_iter().for_each(|(clock, column)| tuning_of_few[clock] = column);
+            best
         };
         // What was left out says as much again.
         let share = episodes as f64 / self.places.len() as f64;
         let share_of_few = episodes as f64 / self.scanned.len() as f64;
         let mut promises: Vec<Promise> = (self.screened.iter())
             .map(|Screened { candidate, columns, points }| {
-                let (gain, begin, beside) = match columns {
+                let (scanned, start) = best(candidate, points).map_or((0.0, None), |(gain, start)| (gain, Some(start)));
+                let scanned = scanned * share_of_few;
+                let (columns, strengths) = match columns {
                     Columns::Whole(change) => {
                         let begin = candidate.begin.clone().unwrap_or_default();
-                        (met(residuals, &moved(change)) - begin.len() as f64, begin, vec![0.0; x.len()])
+                        let gain = share * (met(&fit.residuals, &moved(fit, change)) - begin.len() as f64);
+                        let (candidate, beside) = (candidate.clone(), vec![0.0; x.len()]);
+                        return Promise { candidate, gain, episodes, begin, beside, start: None };
                     }
-                    Columns::Linear(columns) => {
-                        let strengths: Vec<usize> = candidate.strengths().collect();
-                        let reach = |index: &usize| reach(candidate, *index);
-                        let white: Vec<Stack> = (columns.iter().zip(&strengths))
-                            .map(|(change, index)| difference(&moved(change), residuals, reach(index)))
-                            .collect();
-                        let (gain, mut beside) = linear(candidate, &strengths, x, residuals, tuning, &white);
-                        let mut begin = vec![0.0; candidate.coordinates.len()];
-                        for (index, a) in strengths.iter().zip(beside.split_off(x.len())) {
-                            begin[*index] = a;
-                        }
-                        (gain, begin, beside)
-                    }
+                    Columns::Linear(columns) => (columns, candidate.strengths().collect::<Vec<usize>>()),
                 };
-                let (scanned, start) = best(points).map_or((0.0, None), |(gain, start)| (gain, Some(start)));
-                let gain = (gain * share).max(scanned * share_of_few);
-                Promise { candidate: candidate.clone(), gain, episodes, begin, beside, start }
+                let at = stated.unwrap_or(fit);
+                let column = |(change, index): (&Vec<Vec<f64>>, &usize)| -> Stack {
+                    difference(&moved(at, change), residuals, reach(candidate, *index))
+                };
+                let white: Vec<Stack> = columns.iter().zip(&strengths).map(column).collect();
+                let (gain, mut beside) = linear(candidate, &strengths, x, residuals, tuning, &white);
+                let gain = share * gain;
+                let mut begin = vec![0.0; candidate.coordinates.len()];
+                for (index, a) in strengths.iter().zip(beside.split_off(x.len())) {
+                    begin[*index] = a;
+                }
+                let linear_step = || {
+                    let moved = x.iter().zip(&beside).enumerate().map(|(index, (x, d))| {
+                        let [low, high] = model.range(index);
+                        (x + d).clamp(low, high)
+                    });
+                    Start { shared: moved.collect(), own: begin.clone() }
+                };
+                let start = if stated.is_some() && gain > scanned { Some(linear_step()) } else { start };
+                // Of what is re-tuned the steps lead from somewhere else.
+                let beside = if stated.is_some() { vec![0.0; x.len()] } else { beside };
+                Promise { candidate: candidate.clone(), gain: gain.max(scanned), episodes, begin, beside, start }
             })
             .collect();
         promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -194,22 +225,50 @@ fn plus<'a>(before: impl Iterator<Item = &'a Vec<f64>>, change: &[Vec<f64>]) -> 
     before.zip(change).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
 }
 
+/// −ln prior of coordinates, but for a constant.
+fn prior(x: &[f64]) -> f64 {
+    0.5 * x.iter().map(|x| x * x).sum::<f64>()
+}
+
+/// The step from `x` by which re-tuning explains residuals best, as if they were linear: what another strength does re-tuning may have to make up for.
+fn retuned(model: &Model, x: &[f64], residuals: &Stack, tuning: &[Stack]) -> Option<Minimum> {
+    let columns: Vec<&Stack> = tuning.iter().collect();
+    Linear::new(residuals, &columns).minimum(x, |index| model.range(index), 0.0)
+}
+
+/// Derivatives by clocks that give way to a candidate are none; what they were.
+fn without_clocks(part: &Study, candidate: &Candidate, tuning: &mut [Stack]) -> Vec<(usize, Stack)> {
+    let clocks = part.simulator.nominal.replaced_by(candidate.kind());
+    let none = |clock: usize| {
+        let kept = tuning[clock].clone();
+        tuning[clock].iter_mut().for_each(|episode| episode.fill(0.0));
+        (clock, kept)
+    };
+    clocks.map(none).collect()
+}
+
 /// Simulates strengths of a candidate, one coordinate after another: some either way, then a weaker or a stronger one than the best, and in the end the
-/// best of all coordinates together. `before`: residuals of the nominal model.
-fn scan(few: &Study, before: &[Vec<f64>], nominal: &Fit, candidate: &Candidate) -> Vec<Point> {
+/// best of all coordinates together. `before`: residuals of the nominal model; `tuning`: their derivatives by its coordinates.
+fn scan(few: &Study, before: &[Vec<f64>], nominal: &Fit, tuning: &[Stack], candidate: &Candidate) -> Vec<Point> {
     if candidate.begin.is_some() {
         return Vec::new();
     }
+    let mut tuning = tuning.to_vec();
+    without_clocks(few, candidate, &mut tuning);
     let model = nominal.model.with(candidate);
+    let cost = |x: &[f64], raw: &[Vec<f64>]| -> f64 {
+        let white = few.white(raw, nominal.model.engine_errors(x));
+        retuned(&nominal.model, x, &white, &tuning).map_or(f64::INFINITY, |minimum| minimum.cost)
+    };
     let mut points: Vec<(f64, Point)> = Vec::new();
     let look = |own: Vec<f64>| -> (f64, Point) {
         let mut x = [nominal.x.as_slice(), &own].concat();
         let (clocks, raw) = few.with_best_clocks(&model.hypothesis(&x));
+        x.truncate(nominal.x.len());
         x[..clocks.len()].copy_from_slice(&clocks);
-        let cost = cost(&x, &few.white(&raw, model.engine_errors(&x)));
-        (cost, Point { start: Start { clocks, own }, change: changes(&raw, before) })
+        (cost(&x, &raw) + prior(&own), Point { clocks, own, change: changes(&raw, before) })
     };
-    let without = cost(&nominal.x, &few.white(before, nominal.model.engine_errors(&nominal.x)));
+    let without = cost(&nominal.x, before);
     let mut together = vec![0.0; candidate.coordinates.len()];
     for index in candidate.strengths() {
         let at = |a: f64| {
@@ -219,16 +278,20 @@ fn scan(few: &Study, before: &[Vec<f64>], nominal: &Fit, candidate: &Candidate) 
             (low..=high).contains(&a).then(|| look(own))
         };
         let mut own: Vec<(f64, Point)> = STRENGTHS.iter().flat_map(|a| [*a, -a]).filter_map(at).collect();
+        let one_sided = candidate.coordinates[index].range.contains(&0.0);
         let best = |own: &[(f64, Point)]| -> Option<f64> {
             let best = own.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-            (best.0 < without).then(|| best.1.start.own[index])
+            (best.0 < without).then(|| best.1.own[index])
         };
+        // What has one side is looked at there at all of them: a strong effect need not show in a weaker one.
         let next = match best(&own) {
-            Some(a) if a.abs() == STRENGTHS[1] => BEYOND[1].copysign(a),
-            Some(a) => BEYOND[0].copysign(a),
-            None => BEYOND[0],
+            _ if one_sided => BEYOND.to_vec(),
+            Some(a) if a.abs() == STRENGTHS[1] => vec![BEYOND[1].copysign(a)],
+            Some(a) => vec![BEYOND[0].copysign(a)],
+            None => vec![BEYOND[0]],
         };
-        own.extend(at(next));
+        let sides = |a: f64| if one_sided { vec![a, -a] } else { vec![a] };
+        own.extend(next.into_iter().flat_map(sides).filter_map(at));
         together[index] = best(&own).unwrap_or(0.0);
         points.extend(own);
     }
@@ -317,61 +380,20 @@ fn linear(
     columns: &[Stack],
 ) -> (f64, Vec<f64>) {
     let all: Vec<&Stack> = tuning.iter().chain(columns).collect();
-    let (k, n) = (tuning.len(), all.len());
-    let weights = weights(residuals);
-    let gram = DMatrix::from_fn(n, n, |i, j| dot(all[i], all[j], &weights) + f64::from(u8::from(i == j)));
-    let x: Vec<f64> = (0..n).map(|i| z.get(i).copied().unwrap_or(0.0)).collect();
-    let slope = DVector::from_fn(n, |i, _| dot(all[i], residuals, &weights) + x[i]);
-    // What it would cost if residuals were linear: their squares do not tell how much an odd episode may say.
-    let cost_at = |delta: &DVector<f64>| {
-        let mut moved = residuals.clone();
-        for (column, d) in all.iter().zip(delta.iter()) {
-            moved.iter_mut().zip(column.iter()).for_each(|(r, c)| r.axpy(*d, c, 1.0));
-        }
-        let prior: f64 = x.iter().zip(delta.iter()).map(|(x, d)| (x + d) * (x + d)).sum();
-        likelihood::cost(&moved) + 0.5 * prior
+    let x: Vec<f64> = (0..all.len()).map(|i| z.get(i).copied().unwrap_or(0.0)).collect();
+    let range = |index: usize| match index.checked_sub(tuning.len()) {
+        Some(strength) => candidate.coordinates[strengths[strength]].range,
+        None => [f64::NEG_INFINITY, f64::INFINITY],
     };
-    let gain = |kept: &[usize], held: &DVector<f64>| -> Option<(f64, DVector<f64>)> {
-        let m = kept.len();
-        let a = DMatrix::from_fn(m, m, |i, j| gram[(kept[i], kept[j])]);
-        let b = DVector::from_fn(m, |i, _| {
-            -(slope[kept[i]] + (0..n).filter(|j| !kept.contains(j)).map(|j| gram[(kept[i], j)] * held[j]).sum::<f64>())
-        });
-        let cholesky = a.cholesky()?;
-        let mut delta = held.clone();
-        for (i, value) in kept.iter().zip(cholesky.solve(&b).iter()) {
-            delta[*i] = *value;
+    let linear = Linear::new(residuals, &all);
+    let with = linear.minimum(&x, range, 0.0);
+    let without = linear.minimum(&x, |index| if index < tuning.len() { range(index) } else { [0.0; 2] }, 0.0);
+    match (with, without) {
+        (Some(with), Some(without)) => {
+            let evidence = |minimum: &Minimum| -minimum.cost - minimum.half_determinant;
+            (evidence(&with) - evidence(&without), with.delta.iter().copied().collect())
         }
-        Some((-cost_at(&delta) - cholesky.l().diagonal().iter().map(|d| d.ln()).sum::<f64>(), delta))
-    };
-    let nothing = DVector::zeros(n);
-    let without = if k == 0 {
-        -cost_at(&nothing)
-    } else {
-        gain(&(0..k).collect::<Vec<_>>(), &nothing).map_or(-cost_at(&nothing), |(gain, _)| gain)
-    };
-    let mut held = nothing.clone();
-    let mut kept: Vec<usize> = (0..n).collect();
-    let mut best = gain(&kept, &held);
-    // What leaves its range is held at the border.
-    if let Some((_, delta)) = &best {
-        let mut changed = false;
-        for (j, index) in strengths.iter().enumerate() {
-            let [low, high] = candidate.coordinates[*index].range;
-            let value = delta[k + j];
-            if value < low || value > high {
-                held[k + j] = value.clamp(low, high);
-                kept.retain(|i| *i != k + j);
-                changed = true;
-            }
-        }
-        if changed {
-            best = gain(&kept, &held);
-        }
-    }
-    match best {
-        Some((gain, delta)) => (gain - without, delta.iter().copied().collect()),
-        None => (0.0, vec![0.0; n]),
+        _ => (0.0, vec![0.0; all.len()]),
     }
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::budget::Budget;
 use crate::cells::{Cells, Key, key};
 use crate::clock::Clock;
-use crate::likelihood::{Stack, episode_cost};
+use crate::likelihood::{Stack, cell_cost};
 use crate::nominal::Engine;
 use crate::simulator::{Hypothesis, Nudge, Simulator};
 use crate::trial::{Block, Phase, groups};
@@ -130,7 +130,7 @@ impl<'a> Study<'a> {
                     let own =
                         blocks.filter(|(block, _)| clock.stamps(block.kind)).map(|(_, residual)| huber(*residual));
                     let (square, count) = own.fold((0.0, 0), |(sum, n), residual| (sum + residual * residual, n + 1));
-                    episode_cost(square, count)
+                    cell_cost(square, count)
                 };
                 self.chosen.iter().zip(&scanned).map(episode).sum::<f64>() + 0.5 * grid[at] * grid[at]
             };

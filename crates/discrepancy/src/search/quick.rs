@@ -19,8 +19,9 @@ impl Search<'_> {
     pub(crate) fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
         let before = base.log_evidence();
         let share = self.share(screening);
+        let stated = screening.stated.as_ref().filter(|_| base.model.parts.is_empty());
         let (mut quick, mut gained, mut kinds) = (Vec::<Fit>::new(), 0.0_f64, Vec::new());
-        for (promise, begun) in self.begun(part, base, promises) {
+        for (promise, begun) in self.begun(screening, part, base, promises) {
             let (kind, model) = (promise.candidate.kind(), base.model.with(&promise.candidate));
             let hopeless = kinds.len() >= LEAST_KINDS && promise.gain < HOPELESS * share * gained;
             // The best one has to be fitted to all episodes, too.
@@ -30,7 +31,7 @@ impl Search<'_> {
             if !kinds.contains(&kind) {
                 kinds.push(kind);
             }
-            let begin = begun.unwrap_or_else(|| begin(part, base, &model, &promise));
+            let begin = begun.unwrap_or_else(|| begin(part, base, stated, &model, &promise));
             let fit = fit(part, model, begin, Effort::Quick);
             gained = gained.max(fit.log_evidence() - before);
             quick.push(fit);
@@ -91,8 +92,15 @@ impl Search<'_> {
     }
 
     /// What promises most, by what is simulated where fits begin: a linear step says little of what is far from linear, or of what another effect does in part.
-    fn begun(&self, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<(Promise, Option<Begin>)> {
+    fn begun(
+        &self,
+        screening: &Screening,
+        part: &Study,
+        base: &Fit,
+        promises: &[Promise],
+    ) -> Vec<(Promise, Option<Begin>)> {
         let first = base.model.parts.is_empty();
+        let stated = screening.stated.as_ref().filter(|_| first);
         let (promises, looked, kept) = if first {
             (promise_in_place(part, base, promises), self.settings.looks, self.settings.quick_fits)
         } else {
@@ -102,7 +110,7 @@ impl Search<'_> {
         for promise in shortlist(&promises, looked) {
             let model = base.model.with(&promise.candidate);
             if self.affords_both(part, &model) {
-                let begin = begin(part, base, &model, &promise);
+                let begin = begin(part, base, stated, &model, &promise);
                 list.push((begin.cost(part, &model), promise, begin));
             }
         }

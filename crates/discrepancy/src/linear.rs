@@ -1,0 +1,250 @@
+//! Steps of a fit, as if residuals were linear in the coordinates.
+//!
+//! −ln p of a cell is the logarithm of its χ² (see [`crate::likelihood`]). Least squares with the weights of before the step bound it from above, so that their
+//! minimum goes about half of the way: a cell that is explained better counts more. The minimum of −ln p itself is found by least squares
+//! with the weights of where the last ones led, over and over (iteratively reweighted least squares: Green, Journal of the Royal Statistical Society B 46,
+//! 1984). Nothing is simulated for that: what derivatives say of a cell is summed up once.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::likelihood::{Stack, cell_cost, cell_weight};
+
+/// Least squares at most.
+const ITERATIONS: usize = 20;
+/// Least squares that gain less than this in ln posterior are the last ones.
+const LITTLE: f64 = 0.005;
+
+/// Residuals that are linear in a step, summed up by cell.
+pub(crate) struct Linear {
+    cells: Vec<Cell>,
+    coordinates: usize,
+}
+
+/// χ² after a step δ is `chi2` + 2 `slope`·δ + δᵀ `gram` δ.
+struct Cell {
+    count: usize,
+    chi2: f64,
+    slope: Vec<f64>,
+    /// The lower triangle, row by row.
+    gram: Vec<f64>,
+}
+
+/// The best step.
+pub(crate) struct Minimum {
+    /// The step.
+    pub(crate) delta: DVector<f64>,
+    /// −ln posterior after it, but for a constant.
+    pub(crate) cost: f64,
+    /// Half the ln determinant of what least squares say there of the coordinates that stay within their ranges.
+    pub(crate) half_determinant: f64,
+}
+
+impl Linear {
+    /// Of residuals and their derivatives by the coordinates.
+    pub(crate) fn new(residuals: &Stack, jacobian: &[&Stack]) -> Self {
+        let n = jacobian.len();
+        let mut cells: Vec<Cell> = Vec::new();
+        let mut row = vec![0.0; n];
+        for (episode, (residuals, of)) in residuals.episodes() {
+            let first = cells.len();
+            let empty = || Cell { count: 0, chi2: 0.0, slope: vec![0.0; n], gram: vec![0.0; n * (n + 1) / 2] };
+            cells.extend((0..of.count).map(|_| empty()));
+            for (place, (residual, cell)) in residuals.iter().zip(&of.of).enumerate() {
+                row.iter_mut().zip(jacobian).for_each(|(value, column)| *value = column[episode][place]);
+                cells[first + cell].add(*residual, &row);
+            }
+        }
+        Self { cells, coordinates: n }
+    }
+
+    /// −ln p after a step, but for a constant.
+    fn cost(&self, delta: &DVector<f64>) -> f64 {
+        self.cells.iter().map(|cell| cell_cost(cell.chi2_after(delta), cell.count)).sum()
+    }
+
+    /// Weighted sums of `gram` and `slope`, with the weights of after a step.
+    fn weighted(&self, delta: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+        let n = self.coordinates;
+        let (mut gram, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for cell in &self.cells {
+            let weight = cell_weight(cell.chi2_after(delta), cell.count);
+            let mut products = cell.gram.iter();
+            for i in 0..n {
+                slope[i] += weight * cell.slope[i];
+                for (j, product) in (0..=i).zip(&mut products) {
+                    gram[(i, j)] += weight * product;
+                }
+            }
+        }
+        gram.fill_upper_triangle_with_lower_triangle();
+        (gram, slope)
+    }
+
+    /// The step from `x`, whose coordinates have prior N(0, 1), that leads to the least −ln posterior within their ranges. `damping`: by how much the diagonal of
+    /// least squares is larger. `None` where derivatives are no numbers.
+    pub(crate) fn minimum(&self, x: &[f64], range: impl Fn(usize) -> [f64; 2], damping: f64) -> Option<Minimum> {
+        let prior = |delta: &DVector<f64>| 0.5 * x.iter().zip(delta.iter()).map(|(x, d)| (x + d).powi(2)).sum::<f64>();
+        let mut delta = DVector::zeros(x.len());
+        let mut least = self.cost(&delta) + prior(&delta);
+        let mut half_determinant = 0.0;
+        for iteration in 0..ITERATIONS {
+            let (mut gram, mut slope) = self.weighted(&delta);
+            for (i, x) in x.iter().enumerate() {
+                gram[(i, i)] += 1.0;
+                slope[i] += x;
+            }
+            let (next, determinant) = bounded(x, &range, &gram, &slope, damping)?;
+            let cost = self.cost(&next) + prior(&next);
+            if iteration == 0 {
+                half_determinant = determinant;
+            }
+            // Where a border holds a coordinate, or damping, less need not be found.
+            if cost.is_nan() || cost >= least {
+                break;
+            }
+            let gained = least - cost;
+            (delta, least, half_determinant) = (next, cost, determinant);
+            if gained < LITTLE {
+                break;
+            }
+        }
+        Some(Minimum { delta, cost: least, half_determinant })
+    }
+}
+
+impl Cell {
+    fn add(&mut self, residual: f64, row: &[f64]) {
+        self.count += 1;
+        self.chi2 += residual * residual;
+        let mut products = self.gram.iter_mut();
+        for (i, a) in row.iter().enumerate() {
+            self.slope[i] += a * residual;
+            row[..=i].iter().zip(&mut products).for_each(|(b, product)| *product += a * b);
+        }
+    }
+
+    fn chi2_after(&self, delta: &DVector<f64>) -> f64 {
+        let mut chi2 = self.chi2;
+        let mut products = self.gram.iter();
+        for (i, (d, slope)) in delta.iter().zip(&self.slope).enumerate() {
+            let below: f64 = delta.iter().take(i).zip(&mut products).map(|(d, product)| d * product).sum();
+            let own = products.next().copied().unwrap_or(0.0);
+            chi2 += d * (2.0 * (slope + below) + own * d);
+        }
+        chi2.max(0.0)
+    }
+}
+
+/// The minimum of a quadratic form within the ranges, and half the ln determinant of its free part: coordinates that it would push over a border stay there.
+fn bounded(
+    x: &[f64],
+    range: impl Fn(usize) -> [f64; 2],
+    gram: &DMatrix<f64>,
+    slope: &DVector<f64>,
+    damping: f64,
+) -> Option<(DVector<f64>, f64)> {
+    let n = x.len();
+    let mut free: Vec<usize> = (0..n).collect();
+    let mut delta = DVector::zeros(n);
+    loop {
+        let m = free.len();
+        if m == 0 {
+            return Some((delta, 0.0));
+        }
+        let a = DMatrix::from_fn(m, m, |i, j| {
+            let value = gram[(free[i], free[j])];
+            if i == j { value * (1.0 + damping) } else { value }
+        });
+        // What was held at a border moves the others' optimum.
+        let b = DVector::from_fn(m, |i, _| {
+            let held: f64 = (0..n).filter(|j| !free.contains(j)).map(|j| gram[(free[i], j)] * delta[j]).sum();
+            -(slope[free[i]] + held)
+        });
+        let cholesky = a.cholesky()?;
+        let solution = cholesky.solve(&b);
+        let mut worst: Option<(usize, f64, f64)> = None;
+        for (index, step) in free.iter().zip(solution.iter()) {
+            let [low, high] = range(*index);
+            let target = x[*index] + step;
+            let over = (low - target).max(target - high);
+            if over > 0.0 && worst.is_none_or(|(_, _, most)| over > most) {
+                worst = Some((*index, target.clamp(low, high) - x[*index], over));
+            }
+        }
+        let Some((index, held, _)) = worst else {
+            free.iter().zip(solution.iter()).for_each(|(index, step)| delta[*index] = *step);
+            return Some((delta, cholesky.l().diagonal().iter().map(|d| d.ln()).sum()));
+        };
+        delta[index] = held;
+        free.retain(|other| *other != index);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::likelihood::cost;
+
+    /// Two episodes, one of which no step explains.
+    fn residuals() -> (Stack, [Stack; 2]) {
+        let column = |f: fn(f64) -> f64| -> Stack {
+            vec![DVector::from_fn(40, |row, _| f(row as f64)), DVector::from_fn(40, |row, _| f(row as f64 + 0.5))]
+                .into()
+        };
+        let jacobian = [column(|t| 3.0 * (0.3 * t).sin()), column(|t| (0.7 * t).cos())];
+        let right = [2.0, -5.0];
+        let mut residuals = column(|t| (17.0 * t).sin());
+        for (column, right) in jacobian.iter().zip(right) {
+            residuals[0].axpy(-right, &column[0], 1.0);
+        }
+        residuals[1] *= 30.0;
+        (residuals, jacobian)
+    }
+
+    fn after(residuals: &Stack, jacobian: &[Stack], delta: &[f64], x: [f64; 2]) -> f64 {
+        let mut moved = residuals.clone();
+        for (column, d) in jacobian.iter().zip(delta) {
+            moved.iter_mut().zip(column.iter()).for_each(|(r, c)| r.axpy(*d, c, 1.0));
+        }
+        cost(&moved) + 0.5 * x.iter().zip(delta).map(|(x, d)| (x + d).powi(2)).sum::<f64>()
+    }
+
+    #[test]
+    fn one_step_leads_to_the_minimum_where_residuals_are_linear() {
+        let (residuals, jacobian) = residuals();
+        let x = [0.5, 0.25];
+        let linear = Linear::new(&residuals, &jacobian.iter().collect::<Vec<_>>());
+        let found = linear.minimum(&x, |_| [-20.0, 20.0], 0.0).unwrap();
+        let at = |a: f64, b: f64| after(&residuals, &jacobian, &[a, b], x);
+        let [a, b] = [found.delta[0], found.delta[1]];
+        assert!((found.cost - at(a, b)).abs() < 1e-9);
+        // No neighbour is better by more than what ends the search.
+        for (i, j) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1)] {
+            let near = at(a + 0.05 * f64::from(i), b + 0.05 * f64::from(j));
+            assert!(near > found.cost - 0.02, "{i} {j}: {near}, {}", found.cost);
+        }
+        // The one that is explained is, though another one is far off.
+        assert!((a - 2.0).abs() < 0.2 && (b + 5.0).abs() < 0.5, "{a} {b}");
+    }
+
+    #[test]
+    fn what_would_leave_its_range_stays_at_the_border_and_the_others_make_up_for_it() {
+        let (residuals, jacobian) = residuals();
+        let linear = Linear::new(&residuals, &jacobian.iter().collect::<Vec<_>>());
+        let range = |index: usize| if index == 1 { [-3.0, 3.0] } else { [-20.0, 20.0] };
+        let found = linear.minimum(&[0.0, 0.0], range, 0.0).unwrap();
+        assert_eq!(found.delta[1], -3.0);
+        for d in [-0.1, 0.1] {
+            let near = after(&residuals, &jacobian, &[found.delta[0] + d, -3.0], [0.0; 2]);
+            assert!(near > found.cost - 0.02, "{near}, {}", found.cost);
+        }
+        assert!(linear.minimum(&[0.0, 0.0], |_| [0.0, 0.0], 0.0).unwrap().delta.norm() == 0.0);
+    }
+
+    #[test]
+    fn derivatives_that_are_no_numbers_lead_nowhere() {
+        let (residuals, jacobian) = residuals();
+        let broken: Stack = vec![DVector::from_element(40, f64::NAN); 2].into();
+        assert!(Linear::new(&residuals, &[&jacobian[0], &broken]).minimum(&[0.0; 2], |_| [-1.0, 1.0], 0.0).is_none());
+    }
+}
