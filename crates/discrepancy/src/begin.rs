@@ -248,7 +248,7 @@ pub(crate) fn promise_known(part: &Study, base: &Fit, mut promises: Vec<Promise>
         let gain = gained * promise.episodes as f64 / part.chosen.len() as f64;
         if gain > promise.gain {
             promise.gain = gain;
-            promise.start = Some(Start { shared: Vec::new(), own: own.to_vec() });
+            promise.starts = vec![Start { shared: Vec::new(), own: own.to_vec() }];
         }
     }
     promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -292,7 +292,7 @@ pub(crate) fn begin(part: &Study, base: &Fit, stated: Option<&Fit>, model: &Mode
     if promise.candidate.begin.is_none() && changes_nothing {
         tried.push(Place { cost: before, x: at(0.0), raw: base.raw.clone() });
     }
-    if let Some(start) = &promise.start {
+    for start in &promise.starts {
         let mut x = [base.x.as_slice(), &start.own].concat();
         x[..start.shared.len()].copy_from_slice(&start.shared);
         tried.push(simulated(x));

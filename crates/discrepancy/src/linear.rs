@@ -35,7 +35,7 @@ pub(crate) struct Minimum {
     pub(crate) delta: DVector<f64>,
     /// −ln posterior after it, but for a constant.
     pub(crate) cost: f64,
-    /// Half the ln determinant of what least squares say there of the coordinates that stay within their ranges.
+    /// Half the ln determinant of the last least squares, of the coordinates that stay within their ranges.
     pub(crate) half_determinant: f64,
 }
 
@@ -80,12 +80,15 @@ impl Linear {
         (gram, slope)
     }
 
-    /// The step from `x`, whose coordinates have prior N(0, 1), that leads to the least −ln posterior within their ranges. `damping`: by how much the diagonal of
-    /// least squares is larger. `None` where derivatives are no numbers.
+    /// The step from `x`, whose coordinates have prior N(0, 1), that leads to the least −ln posterior within their ranges. `damping`: by which share the diagonal of
+    /// least squares is larger. `None` where residuals or derivatives are no numbers.
     pub(crate) fn minimum(&self, x: &[f64], range: impl Fn(usize) -> [f64; 2], damping: f64) -> Option<Minimum> {
         let prior = |delta: &DVector<f64>| 0.5 * x.iter().zip(delta.iter()).map(|(x, d)| (x + d).powi(2)).sum::<f64>();
         let mut delta = DVector::zeros(x.len());
         let mut least = self.cost(&delta) + prior(&delta);
+        if !least.is_finite() {
+            return None;
+        }
         let mut half_determinant = 0.0;
         for iteration in 0..ITERATIONS {
             let (mut gram, mut slope) = self.weighted(&delta);
@@ -98,7 +101,7 @@ impl Linear {
             if iteration == 0 {
                 half_determinant = determinant;
             }
-            // Where a border holds a coordinate, or damping, less need not be found.
+            // Held at a border, or damped, the next step need not be better.
             if cost.is_nan() || cost >= least {
                 break;
             }
@@ -131,7 +134,8 @@ impl Cell {
             let own = products.next().copied().unwrap_or(0.0);
             chi2 += d * (2.0 * (slope + below) + own * d);
         }
-        chi2.max(0.0)
+        // Rounding may lead below 0; what is no number stays none.
+        if chi2 < 0.0 { 0.0 } else { chi2 }
     }
 }
 
@@ -242,9 +246,16 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_that_are_no_numbers_lead_nowhere() {
+    fn what_is_no_number_leads_nowhere() {
         let (residuals, jacobian) = residuals();
         let broken: Stack = vec![DVector::from_element(40, f64::NAN); 2].into();
-        assert!(Linear::new(&residuals, &[&jacobian[0], &broken]).minimum(&[0.0; 2], |_| [-1.0, 1.0], 0.0).is_none());
+        let leads = |residuals: &Stack, second: &Stack| {
+            Linear::new(residuals, &[&jacobian[0], second]).minimum(&[0.0; 2], |_| [-1.0, 1.0], 0.0).is_some()
+        };
+        assert!(leads(&residuals, &jacobian[1]));
+        assert!(!leads(&residuals, &broken));
+        let mut astray = residuals.clone();
+        astray[1][7] = f64::NAN;
+        assert!(!leads(&astray, &jacobian[1]));
     }
 }

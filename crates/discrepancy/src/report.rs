@@ -120,8 +120,8 @@ pub struct Report {
     pub summary: String,
     /// Named effects, in the order in which they were accepted.
     pub effects: Vec<NamedEffect>,
-    /// Names that the data do not tell apart: with odds above 1 to 20 beside the most probable one, which is the first. Where nothing is named, what the
-    /// log leans to.
+    /// Names that the data do not tell apart: with odds above 1 to 20 beside the most probable one, which is the first. Where nothing is named, those
+    /// of them whose evidence is above 0: what the log leans to.
     pub confusion_set: Vec<&'static str>,
     /// Fitted rivals of the first round, those among them that gain more than what was named but explain held-out episodes worse.
     pub ranking: Vec<RankedEffect>,

@@ -1,10 +1,11 @@
-//! Which effects could explain what the re-tuned nominal model leaves.
+//! Which effects could explain what the nominal model leaves.
 //!
 //! For each candidate a linear step, and a scan of its strengths over what is plausible: what rolls, slides off or meets a tool elsewhere is no multiple
 //! of what a slight effect does. At each point of a scan clocks are set anew, and everything else is re-tuned as if residuals were linear, which costs no
 //! simulation.
 //!
-//! Both begin where the log says, not where re-tuning has led: that may have made up for what is missing, and then nothing like it shows.
+//! Both begin where the log says, not where re-tuning has led: that may have made up for what is missing, and then nothing like it shows. A body in the way
+//! is tried beside the re-tuned model, because what meets it has to come there in time.
 
 use std::ops::Range;
 
@@ -16,6 +17,7 @@ use crate::fit::Fit;
 use crate::likelihood::{self, Stack, pick};
 use crate::linear::{Linear, Minimum};
 use crate::model::Model;
+use crate::simulator::Hypothesis;
 use crate::study::{Study, difference};
 
 /// Episodes that the screening looks at, at most.
@@ -31,7 +33,7 @@ const REACH: f64 = 0.35;
 const SCANNED: usize = 4;
 /// Strengths that are looked at, in units, either way as far as they are within the range...
 const STRENGTHS: [f64; 2] = [0.5, 2.0];
-/// ... and, from the best of those, weaker or stronger ones.
+/// ... and, from the best of those, a weaker or a stronger one; both of what has one side.
 const BEYOND: [f64; 2] = [0.125, 8.0];
 
 /// What the screening says of a candidate.
@@ -45,10 +47,10 @@ pub struct Promise {
     pub episodes: usize,
     /// Coordinates to begin a fit from.
     pub begin: Vec<f64>,
-    /// By how much the coordinates of the model without it would move then; 0 with such a start.
+    /// By how much the coordinates of the model without it would move then; 0 where the screening began somewhere else.
     pub beside: Vec<f64>,
-    /// The best point of the scan, if it gains anything, or where the linear step leads, if it does not begin where re-tuning has led.
-    pub(crate) start: Option<Start>,
+    /// The best point of the scan, if it gains anything, and where the linear step leads from where the screening began, if that promises more.
+    pub(crate) starts: Vec<Start>,
 }
 
 /// Where a fit may begin.
@@ -70,6 +72,8 @@ pub struct Screening {
     screened: Vec<Screened>,
     /// Where the first effect is looked for, if not where re-tuning has led.
     pub(crate) stated: Option<Fit>,
+    /// Clocks where the scans began.
+    clocks: Vec<f64>,
 }
 
 #[derive(Debug)]
@@ -98,7 +102,7 @@ struct Point {
 
 impl Screening {
     /// Simulates every candidate beside the nominal model in the episodes of `part`, which are those at `places` of all: as the log states it, or else as
-    /// re-tuned, `null`.
+    /// re-tuned, `null`; bodies beside the latter.
     #[must_use]
     pub fn new(part: &Study, places: Vec<usize>, null: &Fit, stated: Option<Fit>, candidates: &[Candidate]) -> Self {
         let nominal = stated.as_ref().unwrap_or(null);
@@ -107,13 +111,13 @@ impl Screening {
         let scanned = spread(nominal, &part.groups(), SCANNED);
         let few = part.part(&scanned);
         let columns = |candidate: &Candidate| {
-            let change = |a: &[f64]| -> Vec<Vec<f64>> {
-                let mut hypothesis = hypothesis.clone();
+            let changed = |mut hypothesis: Hypothesis, a: &[f64], base: &[Vec<f64>]| -> Vec<Vec<f64>> {
                 hypothesis.effects.push(candidate.effect(a));
-                changes(&part.raw(&hypothesis), &base)
+                changes(&part.raw(&hypothesis), base)
             };
+            let change = |a: &[f64]| changed(hypothesis.clone(), a, &base);
             match &candidate.begin {
-                Some(begin) => Columns::Whole(change(begin)),
+                Some(begin) => Columns::Whole(changed(null.model.hypothesis(&null.x), begin, &null.raw)),
                 None => Columns::Linear(
                     candidate
                         .strengths()
@@ -138,7 +142,8 @@ impl Screening {
             candidate: candidate.clone(),
         };
         let screened = candidates.iter().map(one).collect();
-        Self { places, scanned, screened, stated }
+        let clocks = nominal.x[..nominal.model.clocks].to_vec();
+        Self { places, scanned, screened, clocks, stated }
     }
 
     /// What each candidate would bring in so many episodes beside what `fit` has; the most promising first. `part` and `fit` know the episodes of the
@@ -159,8 +164,12 @@ impl Screening {
             let kept = without_clocks(part, candidate, &mut tuning_of_few);
             let gain = |point: &Point| -> Option<(f64, Start)> {
                 let raw = plus(self.scanned.iter().map(|place| &raw[*place]), &point.change);
+                // Clocks moved by as much as from where the scan began.
                 let mut shared = x.clone();
-                shared[..point.clocks.len()].copy_from_slice(&point.clocks);
+                for (clock, to) in point.clocks.iter().enumerate() {
+                    let [low, high] = model.range(clock);
+                    shared[clock] = (x[clock] + to - self.clocks[clock]).clamp(low, high);
+                }
                 let white = few.white(&raw, model.engine_errors(&shared));
                 let again = retuned(model, &shared, &white, &tuning_of_few)?;
                 shared.iter_mut().zip(again.delta.iter()).for_each(|(x, d)| *x += d);
@@ -176,14 +185,15 @@ impl Screening {
         let share_of_few = episodes as f64 / self.scanned.len() as f64;
         let mut promises: Vec<Promise> = (self.screened.iter())
             .map(|Screened { candidate, columns, points }| {
-                let (scanned, start) = best(candidate, points).map_or((0.0, None), |(gain, start)| (gain, Some(start)));
+                let (scanned, mut starts) =
+                    best(candidate, points).map_or((0.0, Vec::new()), |(gain, start)| (gain, vec![start]));
                 let scanned = scanned * share_of_few;
                 let (columns, strengths) = match columns {
                     Columns::Whole(change) => {
                         let begin = candidate.begin.clone().unwrap_or_default();
                         let gain = share * (met(&fit.residuals, &moved(fit, change)) - begin.len() as f64);
                         let (candidate, beside) = (candidate.clone(), vec![0.0; x.len()]);
-                        return Promise { candidate, gain, episodes, begin, beside, start: None };
+                        return Promise { candidate, gain, episodes, begin, beside, starts: Vec::new() };
                     }
                     Columns::Linear(columns) => (columns, candidate.strengths().collect::<Vec<usize>>()),
                 };
@@ -192,23 +202,26 @@ impl Screening {
                     difference(&moved(at, change), residuals, reach(candidate, *index))
                 };
                 let white: Vec<Stack> = columns.iter().zip(&strengths).map(column).collect();
-                let (gain, mut beside) = linear(candidate, &strengths, x, residuals, tuning, &white);
+                // A clock that gives way jumps, whatever the strength: no step is linear then.
+                let jumps = part.simulator.nominal.replaced_by(candidate.kind()).next().is_some();
+                let (gain, mut beside) = if jumps {
+                    (0.0, vec![0.0; x.len() + strengths.len()])
+                } else {
+                    let range = |index: usize| model.range(index);
+                    linear(candidate, &strengths, x, residuals, (tuning, &range), &white)
+                };
                 let gain = share * gain;
                 let mut begin = vec![0.0; candidate.coordinates.len()];
                 for (index, a) in strengths.iter().zip(beside.split_off(x.len())) {
                     begin[*index] = a;
                 }
-                let linear_step = || {
-                    let moved = x.iter().zip(&beside).enumerate().map(|(index, (x, d))| {
-                        let [low, high] = model.range(index);
-                        (x + d).clamp(low, high)
-                    });
-                    Start { shared: moved.collect(), own: begin.clone() }
-                };
-                let start = if stated.is_some() && gain > scanned { Some(linear_step()) } else { start };
-                // Of what is re-tuned the steps lead from somewhere else.
+                if stated.is_some() && gain > scanned {
+                    let shared = x.iter().zip(&beside).map(|(x, d)| x + d).collect();
+                    starts.push(Start { shared, own: begin.clone() });
+                }
+                // No step from where re-tuning has led.
                 let beside = if stated.is_some() { vec![0.0; x.len()] } else { beside };
-                Promise { candidate: candidate.clone(), gain: gain.max(scanned), episodes, begin, beside, start }
+                Promise { candidate: candidate.clone(), gain: gain.max(scanned), episodes, begin, beside, starts }
             })
             .collect();
         promises.sort_by(|a, b| b.gain.total_cmp(&a.gain));
@@ -236,7 +249,7 @@ fn retuned(model: &Model, x: &[f64], residuals: &Stack, tuning: &[Stack]) -> Opt
     Linear::new(residuals, &columns).minimum(x, |index| model.range(index), 0.0)
 }
 
-/// Derivatives by clocks that give way to a candidate are none; what they were.
+/// Sets the derivatives by clocks that give way to a candidate to 0, and says what they were.
 fn without_clocks(part: &Study, candidate: &Candidate, tuning: &mut [Stack]) -> Vec<(usize, Stack)> {
     let clocks = part.simulator.nominal.replaced_by(candidate.kind());
     let none = |clock: usize| {
@@ -253,12 +266,12 @@ fn scan(few: &Study, before: &[Vec<f64>], nominal: &Fit, tuning: &[Stack], candi
     if candidate.begin.is_some() {
         return Vec::new();
     }
-    let mut tuning = tuning.to_vec();
-    without_clocks(few, candidate, &mut tuning);
+    let mut beside = tuning.to_vec();
+    without_clocks(few, candidate, &mut beside);
     let model = nominal.model.with(candidate);
-    let cost = |x: &[f64], raw: &[Vec<f64>]| -> f64 {
+    let cost = |x: &[f64], raw: &[Vec<f64>], tuning: &[Stack]| -> f64 {
         let white = few.white(raw, nominal.model.engine_errors(x));
-        retuned(&nominal.model, x, &white, &tuning).map_or(f64::INFINITY, |minimum| minimum.cost)
+        retuned(&nominal.model, x, &white, tuning).map_or(f64::INFINITY, |minimum| minimum.cost)
     };
     let mut points: Vec<(f64, Point)> = Vec::new();
     let look = |own: Vec<f64>| -> (f64, Point) {
@@ -266,9 +279,9 @@ fn scan(few: &Study, before: &[Vec<f64>], nominal: &Fit, tuning: &[Stack], candi
         let (clocks, raw) = few.with_best_clocks(&model.hypothesis(&x));
         x.truncate(nominal.x.len());
         x[..clocks.len()].copy_from_slice(&clocks);
-        (cost(&x, &raw) + prior(&own), Point { clocks, own, change: changes(&raw, before) })
+        (cost(&x, &raw, &beside) + prior(&own), Point { clocks, own, change: changes(&raw, before) })
     };
-    let without = cost(&nominal.x, before);
+    let without = cost(&nominal.x, before, tuning);
     let mut together = vec![0.0; candidate.coordinates.len()];
     for index in candidate.strengths() {
         let at = |a: f64| {
@@ -369,21 +382,21 @@ fn spread(fit: &Fit, groups: &[Range<usize>], count: usize) -> Vec<usize> {
     places
 }
 
-/// What ln evidence gains by the strengths' columns beside re-tuning; by how much what is re-tuned moves then, followed by the best values of the
+/// What ln evidence gains by the strengths' columns beside re-tuning, of which `tuned` says the ranges; by how much what is re-tuned moves then, followed by the best values of the
 /// strengths, held to their ranges.
 fn linear(
     candidate: &Candidate,
     strengths: &[usize],
     z: &[f64],
     residuals: &Stack,
-    tuning: &[Stack],
+    (tuning, tuned): (&[Stack], &dyn Fn(usize) -> [f64; 2]),
     columns: &[Stack],
 ) -> (f64, Vec<f64>) {
     let all: Vec<&Stack> = tuning.iter().chain(columns).collect();
     let x: Vec<f64> = (0..all.len()).map(|i| z.get(i).copied().unwrap_or(0.0)).collect();
     let range = |index: usize| match index.checked_sub(tuning.len()) {
         Some(strength) => candidate.coordinates[strengths[strength]].range,
-        None => [f64::NEG_INFINITY, f64::INFINITY],
+        None => tuned(index),
     };
     let linear = Linear::new(residuals, &all);
     let with = linear.minimum(&x, range, 0.0);
@@ -410,7 +423,8 @@ mod tests {
         let residuals = vec![&tuning[0] * 0.5 - &strength[0] * 0.7];
         let damping = candidate(EffectKind::ViscousDamping);
         let strengths: Vec<usize> = damping.strengths().collect();
-        let (gain, step) = linear(&damping, &strengths, &[2.0], &residuals.into(), &[tuning], &[strength]);
+        let (gain, step) =
+            linear(&damping, &strengths, &[2.0], &residuals.into(), (&[tuning], &|_| [-8.0, 8.0]), &[strength]);
         assert!((step[0] + 0.5).abs() < 1e-2 && (step[1] - 0.7).abs() < 1e-2, "{step:?}");
         assert!(gain > 100.0, "{gain}");
     }
