@@ -154,6 +154,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             jacobian = derivatives(study, &model, &x, (&raw, &residuals));
             fresh = Some(x.clone());
         }
+        let mut linear = None;
         let mut damping = 1e-3;
         let mut moved = false;
         for _ in 0..STEPS {
@@ -161,8 +162,9 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             if !model.parts.is_empty() && !study.affords(simulation) {
                 break;
             }
-            let linear = Linear::new(&residuals, &jacobian.iter().collect::<Vec<_>>());
-            let Some(step) = linear.minimum(&x, |index| model.range(index), damping) else { break };
+            // After a step that was not taken nothing has changed but the damping.
+            let sums = linear.get_or_insert_with(|| Linear::new(&residuals, &jacobian.iter().collect::<Vec<_>>()));
+            let Some(step) = sums.minimum(&x, |index| model.range(index), damping) else { break };
             let promise = cost(&x, &residuals) - step.cost;
             // A promise that a fresh Jacobian makes is worth more than one of an old one.
             if promise < WORTHWHILE || (!moved && round > 0 && promise < 6.0 * WORTHWHILE) {
@@ -180,6 +182,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
             if gain > 0.0 {
                 broyden(&model, &mut jacobian, &residuals, &found, &step.delta);
                 (x, raw, residuals) = (next, found_raw, found);
+                linear = None;
                 damping = (damping * 0.2).max(1e-6);
             } else {
                 damping = (damping * 20.0).clamp(DAMPED, 1e6);

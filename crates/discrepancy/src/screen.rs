@@ -107,7 +107,7 @@ impl Screening {
     pub fn new(part: &Study, places: Vec<usize>, null: &Fit, stated: Option<Fit>, candidates: &[Candidate]) -> Self {
         let nominal = stated.as_ref().unwrap_or(null);
         let hypothesis = nominal.model.hypothesis(&nominal.x);
-        let base = part.raw(&hypothesis);
+        let base = &nominal.raw;
         let scanned = spread(nominal, &part.groups(), SCANNED);
         let few = part.part(&scanned);
         let columns = |candidate: &Candidate| {
@@ -115,7 +115,7 @@ impl Screening {
                 hypothesis.effects.push(candidate.effect(a));
                 changes(&part.raw(&hypothesis), base)
             };
-            let change = |a: &[f64]| changed(hypothesis.clone(), a, &base);
+            let change = |a: &[f64]| changed(hypothesis.clone(), a, base);
             match &candidate.begin {
                 Some(begin) => Columns::Whole(changed(null.model.hypothesis(&null.x), begin, &null.raw)),
                 None => Columns::Linear(
@@ -151,7 +151,8 @@ impl Screening {
     #[must_use]
     pub fn promises(&self, part: &Study, fit: &Fit, episodes: usize) -> Vec<Promise> {
         let stated = self.stated.as_ref().filter(|_| fit.model.parts.is_empty());
-        let Fit { model, x, raw, residuals, jacobian: tuning, .. } = stated.unwrap_or(fit);
+        let at = stated.unwrap_or(fit);
+        let Fit { model, x, raw, residuals, jacobian: tuning, .. } = at;
         let moved = |Fit { model, x, raw, .. }: &Fit, change: &Vec<Vec<f64>>| -> Stack {
             part.white(&plus(raw.iter(), change), model.engine_errors(x))
         };
@@ -197,7 +198,6 @@ impl Screening {
                     }
                     Columns::Linear(columns) => (columns, candidate.strengths().collect::<Vec<usize>>()),
                 };
-                let at = stated.unwrap_or(fit);
                 let column = |(change, index): (&Vec<Vec<f64>>, &usize)| -> Stack {
                     difference(&moved(at, change), residuals, reach(candidate, *index))
                 };

@@ -19,9 +19,8 @@ impl Search<'_> {
     pub(crate) fn quick(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<Fit> {
         let before = base.log_evidence();
         let share = self.share(screening);
-        let stated = screening.stated.as_ref().filter(|_| base.model.parts.is_empty());
         let (mut quick, mut gained, mut kinds) = (Vec::<Fit>::new(), 0.0_f64, Vec::new());
-        for (promise, begun) in self.begun(screening, part, base, promises) {
+        for (promise, begin) in self.begun(screening, part, base, promises) {
             let (kind, model) = (promise.candidate.kind(), base.model.with(&promise.candidate));
             let hopeless = kinds.len() >= LEAST_KINDS && promise.gain < HOPELESS * share * gained;
             // The best one has to be fitted to all episodes, too.
@@ -31,7 +30,6 @@ impl Search<'_> {
             if !kinds.contains(&kind) {
                 kinds.push(kind);
             }
-            let begin = begun.unwrap_or_else(|| begin(part, base, stated, &model, &promise));
             let fit = fit(part, model, begin, Effort::Quick);
             gained = gained.max(fit.log_evidence() - before);
             quick.push(fit);
@@ -92,13 +90,7 @@ impl Search<'_> {
     }
 
     /// What promises most, by what is simulated where fits begin: a linear step says little of what is far from linear, or of what another effect does in part.
-    fn begun(
-        &self,
-        screening: &Screening,
-        part: &Study,
-        base: &Fit,
-        promises: &[Promise],
-    ) -> Vec<(Promise, Option<Begin>)> {
+    fn begun(&self, screening: &Screening, part: &Study, base: &Fit, promises: &[Promise]) -> Vec<(Promise, Begin)> {
         let first = base.model.parts.is_empty();
         let stated = screening.stated.as_ref().filter(|_| first);
         let (promises, looked, kept) = if first {
@@ -116,7 +108,7 @@ impl Search<'_> {
         }
         list.sort_by(|a, b| a.0.total_cmp(&b.0));
         of_first(&mut list, kept, |(_, promise, _)| promise.candidate.kind());
-        list.into_iter().map(|(_, promise, begin)| (promise, Some(begin))).collect()
+        list.into_iter().map(|(_, promise, begin)| (promise, begin)).collect()
     }
 }
 
