@@ -33,7 +33,20 @@ pub fn say(text: &str) {
 
 /// Says why a program ends: one line, whatever names and files are quoted in it.
 pub fn complain(error: &dyn Display) {
-    say(&format!("error: {}", one_line(&format!("{error:#}"), 4000)));
+    say(&format!("error: {}", one_line(&without_codes(&format!("{error:#}")), 4000)));
+}
+
+/// Without the numbers that the operating system's words end with, ` (os error 2)`, which say nothing more.
+fn without_codes(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let mut kept = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        match part.trim_start_matches(|c: char| c.is_ascii_digit()).strip_prefix(')') {
+            Some(rest) => kept.push_str(rest),
+            None => kept.extend([" (os error ", part]),
+        }
+    }
+    kept
 }
 
 /// [`show`] of a line, as `println!` formats it.
@@ -46,4 +59,23 @@ macro_rules! out {
 #[macro_export]
 macro_rules! say {
     ($($argument:tt)*) => { $crate::say(&::std::format!($($argument)*)) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_system_says_comes_without_its_number() {
+        let error = io::Error::from_raw_os_error(2).to_string();
+        assert!(error.ends_with(" (os error 2)"), "{error}");
+        let plain = error.trim_end_matches(" (os error 2)");
+        assert_eq!(
+            without_codes(&format!("cannot read a: {error}; cannot read b: {error}.")),
+            format!("cannot read a: {plain}; cannot read b: {plain}.")
+        );
+        for other in ["", "a name (os error x)", " (os error "] {
+            assert_eq!(without_codes(other), other);
+        }
+    }
 }
