@@ -61,6 +61,12 @@ pub enum Error {
         /// What was given.
         text: String,
     },
+    /// An override whose value begins as a list, a table or a text in quotes, and is none.
+    #[error("--set {text}: expected a TOML value, for example [1, 2], [\"a\", \"b\"] or {{ low = 0.1, high = 0.2 }}")]
+    OverrideValue {
+        /// What was given.
+        text: String,
+    },
     /// A value out of its range.
     #[error("{file}: {problem}")]
     Value {

@@ -192,10 +192,14 @@ fn parse_override(text: &str) -> Result<Table, Error> {
     if key.is_empty() || key.contains(['\n', '#', '[']) || value.contains('\n') {
         return Err(error());
     }
-    // A bare word is a string: `--set preset=paper` needs no quotes.
-    toml::from_str(&format!("{key} = {value}"))
-        .or_else(|_| toml::from_str(&format!("{key} = \"{}\"", value.escape_default())))
-        .map_err(|_| error())
+    toml::from_str(&format!("{key} = {value}")).or_else(|_| {
+        // What begins as a list, a table or a text in quotes has to be one.
+        if value.starts_with(['[', '{', '"', '\'']) {
+            return Err(Error::OverrideValue { text: one_line(text, QUOTED) });
+        }
+        // A bare word is a string: `--set preset=paper` needs no quotes.
+        toml::from_str(&format!("{key} = \"{}\"", value.escape_default())).map_err(|_| error())
+    })
 }
 
 #[cfg(test)]
@@ -254,6 +258,16 @@ mod tests {
         let again = load(|s| s.domain = file.display().to_string());
         std::fs::remove_file(&file).unwrap();
         assert_eq!(again.unwrap(), scenario);
+    }
+
+    #[test]
+    fn an_override_that_begins_as_a_list_or_table_has_to_be_one() {
+        for broken in ["[a, b]", "{ low = }", "[1, 2", "\"word", "'word"] {
+            let text = format!("distribution.friction={broken}");
+            let message = load(|s| s.set = vec![text.clone()]).unwrap_err().to_string();
+            assert!(message.starts_with(&format!("--set {text}: expected a TOML value, for example")), "{message}");
+        }
+        assert!(load(|s| s.set = vec!["preset=paper".into()]).is_ok());
     }
 
     #[test]
