@@ -194,7 +194,8 @@ fn parse_override(text: &str) -> Result<Table, Error> {
     }
     toml::from_str(&format!("{key} = {value}")).or_else(|_| {
         // What begins as a list, a table or a text in quotes has to be one.
-        if value.starts_with(['[', '{', '"', '\'']) {
+        let is_none = toml::from_str::<Table>(&format!("x = {value}")).is_err();
+        if is_none && value.starts_with(['[', '{', '"', '\'']) {
             return Err(Error::OverrideValue { text: one_line(text, QUOTED) });
         }
         // A bare word is a string: `--set preset=paper` needs no quotes.
@@ -267,6 +268,8 @@ mod tests {
             let message = load(|s| s.set = vec![text.clone()]).unwrap_err().to_string();
             assert!(message.starts_with(&format!("--set {text}: expected a TOML value, for example")), "{message}");
         }
+        let key = load(|s| s.set = vec!["a b=[1, 2]".into()]).unwrap_err().to_string();
+        assert!(key.contains("expected key=value with a dotted key"), "{key}");
         assert!(load(|s| s.set = vec!["preset=paper".into()]).is_ok());
     }
 
