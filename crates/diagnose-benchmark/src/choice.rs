@@ -28,19 +28,24 @@ impl Choice {
     }
 }
 
-/// Maximum a posteriori θ, whose components have the prior N(0, `variances`), by damped Newton steps.
+/// Mean and variance of the normal prior of a component of θ.
+pub type Prior = (f64, f64);
+
+/// Maximum a posteriori θ, by damped Newton steps.
 #[must_use]
-pub fn fit(choices: &[Choice], variances: &[f64]) -> DVector<f64> {
-    let size = variances.len();
-    let precision = DVector::from_iterator(size, variances.iter().map(|variance| variance.recip()));
+pub fn fit(choices: &[Choice], priors: &[Prior]) -> DVector<f64> {
+    let size = priors.len();
+    let precision = DVector::from_iterator(size, priors.iter().map(|(_, variance)| variance.recip()));
+    let begin = DVector::from_iterator(size, priors.iter().map(|(mean, _)| *mean));
     let cost = |theta: &DVector<f64>| -> f64 {
-        let prior: f64 = theta.iter().zip(&precision).map(|(x, precision)| 0.5 * precision * x * x).sum();
+        let away = theta - &begin;
+        let prior: f64 = away.iter().zip(&precision).map(|(x, precision)| 0.5 * precision * x * x).sum();
         prior + choices.iter().map(|choice| -choice.weight * choice.shares(theta)[choice.chosen].ln()).sum::<f64>()
     };
-    let mut theta = DVector::zeros(size);
+    let mut theta = begin.clone();
     let mut now = cost(&theta);
     for _ in 0..STEPS {
-        let mut slope = theta.component_mul(&precision);
+        let mut slope = (&theta - &begin).component_mul(&precision);
         let mut curvature = DMatrix::from_diagonal(&precision);
         for choice in choices {
             let shares = choice.shares(&theta);
@@ -87,7 +92,7 @@ mod tests {
         let choices: Vec<Choice> = [0, 0, 0, 0, 0, 0, 1, 1, 1, 2]
             .map(|chosen| Choice { alternatives: alternatives(), chosen, weight: 1.0 })
             .to_vec();
-        let found = fit(&choices, &[100.0; 3]);
+        let found = fit(&choices, &[(0.0, 100.0); 3]);
         // The prior of the offsets draws them together by less than a hundredth.
         assert!((found[0] - found[1] - 2.0_f64.ln()).abs() < 0.02, "{found}");
         assert!((found[1] - found[2] - 3.0_f64.ln()).abs() < 0.05, "{found}");
@@ -96,8 +101,8 @@ mod tests {
     #[test]
     fn one_that_counts_twice_is_two() {
         let choice = |chosen, weight| Choice { alternatives: vec![unit(2, 0), unit(2, 1)], chosen, weight };
-        let twice = fit(&[choice(0, 2.0), choice(1, 1.0)], &[1.0; 2]);
-        let two = fit(&[choice(0, 1.0), choice(0, 1.0), choice(1, 1.0)], &[1.0; 2]);
+        let twice = fit(&[choice(0, 2.0), choice(1, 1.0)], &[(0.0, 1.0); 2]);
+        let two = fit(&[choice(0, 1.0), choice(0, 1.0), choice(1, 1.0)], &[(0.0, 1.0); 2]);
         assert!((twice - two).norm() < 1e-9);
     }
 
@@ -111,7 +116,7 @@ mod tests {
                 Choice { alternatives: alternatives.collect(), chosen: usize::from(i % 5 == 0), weight: 1.0 }
             })
             .collect();
-        let (variance, found) = (0.5, fit(&choices, &[0.5]));
+        let (variance, found) = (0.5, fit(&choices, &[(0.0, 0.5)]));
         let slope: f64 = choices
             .iter()
             .map(|choice| {
@@ -123,9 +128,16 @@ mod tests {
     }
 
     #[test]
+    fn what_nothing_is_learnt_of_stays_where_it_began() {
+        let alternatives = vec![unit(3, 0), unit(3, 1)];
+        let found = fit(&[Choice { alternatives, chosen: 0, weight: 1.0 }], &[(0.5, 0.1), (-0.5, 1e-9), (7.0, 1.0)]);
+        assert!(found[0] > 0.5 && (found[1] + 0.5).abs() < 1e-6 && found[2] == 7.0, "{found}");
+    }
+
+    #[test]
     fn what_is_always_chosen_leaves_finite_weights() {
         let alternatives = vec![DVector::from_element(1, 1.0), DVector::from_element(1, -1.0)];
-        let found = fit(&vec![Choice { alternatives, chosen: 0, weight: 1.0 }; 4], &[1.0]);
+        let found = fit(&vec![Choice { alternatives, chosen: 0, weight: 1.0 }; 4], &[(0.0, 1.0)]);
         assert!(found[0] > 0.3 && found[0] < 3.0, "{found}");
     }
 }

@@ -320,6 +320,8 @@ pub(crate) mod tests {
             motion_after: 2.0,
             motion_share: [0.1; 2],
             force_share: [0.0; 2],
+            lawful_share: [0.0; 2],
+            apart_readings: [0.0; 2],
             episodes: [20, 4],
         }];
         Example { log: "log".into(), truth, findings, off: vec![0.5], rollouts: 100, seconds: 1.0, withheld: false }

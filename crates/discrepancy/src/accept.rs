@@ -74,7 +74,7 @@ pub(crate) fn better_heldout(found: &Heldout, other: &Heldout) -> bool {
 }
 
 /// Whether each effect is there whichever episodes are left out: some strength of it is more than negligible, with the same sign, in nearly all
-/// resamples, as wide as intervals of our own engine's logs; and it is no error of the engine.
+/// resamples; and it is no error of the engine.
 pub(crate) fn lasts(fit: &Fit, groups: &[Range<usize>], seed: u64) -> bool {
     let Some(mut samples) = bootstrap(fit, groups, seed) else { return false };
     widen(&mut samples, fit, 0.0, 1.0);

@@ -15,7 +15,7 @@ use crate::findings::Findings;
 use crate::report::Verdict;
 
 /// Names of the features of an effect, in order.
-pub const EFFECT_FEATURES: [&str; 13] = [
+pub const EFFECT_FEATURES: [&str; 15] = [
     "lead",
     "lead, explained",
     "lead over twins",
@@ -29,10 +29,13 @@ pub const EFFECT_FEATURES: [&str; 13] = [
     "ln motion after",
     "ln force share",
     "coordinates",
+    "lawful share",
+    "ln apart",
 ];
 
 /// Names of the features of a log, in order.
-pub const LOG_FEATURES: [&str; 4] = ["ln before", "ln motion share", "ln force share", "ln episodes"];
+pub const LOG_FEATURES: [&str; 6] =
+    ["ln before", "ln motion share", "ln force share", "ln episodes", "lawful share", "ln apart"];
 
 /// No gain and no error is larger to a decision.
 const MOST: f64 = 1e6;
@@ -85,6 +88,8 @@ pub fn effect_features(findings: &Findings, compared: &[Findings]) -> [f64; EFFE
         logarithm(findings.motion_after, 0.5),
         logarithm(findings.force_share[1], 1e-2),
         held(findings.coordinates as f64, 0.0, 4.0),
+        held(findings.lawful_share[1], 0.0, 1.0),
+        logarithm(findings.apart_readings[1], 1.0),
     ]
 }
 
@@ -97,6 +102,8 @@ pub fn log_features(findings: &[Findings]) -> [f64; LOG_FEATURES.len()] {
         of(|first| first.motion_share[0], 1e-3),
         of(|first| first.force_share[0], 1e-2),
         of(|first| first.episodes.iter().sum::<usize>() as f64, 1.0),
+        findings.first().map_or(0.0, |first| held(first.lawful_share[0], 0.0, 1.0)),
+        of(|first| first.apart_readings[0], 1.0),
     ]
 }
 
@@ -178,7 +185,7 @@ pub struct Decision {
     pub none: Score,
     /// Of something else.
     pub unknown: Score,
-    /// By how much 90 % intervals of strengths are wider than those that our own engine's logs ask for: so wide, 90 % of the true values of the logs that
+    /// By how much 90 % intervals are wider than those of the bootstrap: so wide, 90 % of the true values of the logs that
     /// it was made from lie within.
     pub width: f64,
 }
@@ -243,6 +250,8 @@ pub(crate) mod tests {
             motion_after: 1.1,
             motion_share: [0.1, 0.01],
             force_share: [0.3, 0.1],
+            lawful_share: [0.3, 0.1],
+            apart_readings: [2.0, 0.5],
             episodes: [20, 4],
         }
     }

@@ -22,7 +22,7 @@ use crate::noise::SensorNoise;
 use crate::nominal::{Nominal, Tunable};
 use crate::prepared::Prepared;
 use crate::progress::Progress;
-use crate::replay::worst;
+use crate::replay::{replays, worst};
 use crate::report::Verdict;
 use crate::rival::Round;
 use crate::screen::{Screening, places};
@@ -78,7 +78,8 @@ pub struct Settings {
     pub rollouts: usize,
     /// After this many fits end where they are.
     pub most: usize,
-    /// No fit of an effect begins a simulation that would end above this many; what is decided, drawn and told of the last ones adds up to 160, and what is lacking is looked at in 20 more.
+    /// No fit of an effect begins a simulation that would end above this many. What is decided by, drawn and told of the last ones adds up to 160, and what each leaves of the worst
+    /// episodes is looked at in 280 more.
     pub limit: usize,
     /// Mean square of the residuals of an episode, on average over all but the worst, above which a second effect is looked for at once.
     pub unexplained: f64,
@@ -126,9 +127,9 @@ impl Default for Settings {
             threshold_rolling: 20.0,
             effects: 2,
             effects_thrown: 4,
-            rollouts: 4000,
-            most: 4300,
-            limit: 4800,
+            rollouts: 3900,
+            most: 4200,
+            limit: 4540,
             unexplained: 1.4,
             // Seed 7: a pair's second effect stands out at 0.002 or less, but for one of 11; what two spurious ones were found for, at 0.14 and 0.87.
             another: 0.05,
@@ -217,9 +218,9 @@ impl Diagnosis {
 
     /// Says of a gap that nothing explains what it follows.
     fn describe(&mut self, study: &Study) {
-        let worst = worst(study.simulator, &study.chosen, &self.nominal);
-        self.lacking_force = lacking_force(study.simulator, &self.nominal, &worst, &self.units);
-        self.contact_gap = contact_gap(&worst).map(|gap| gap.in_units(&self.units));
+        let replays = replays(study, &worst(study, &self.nominal), &self.nominal);
+        self.lacking_force = lacking_force(study.simulator, &self.nominal, &replays, &self.units);
+        self.contact_gap = contact_gap(&replays).map(|gap| gap.in_units(&self.units));
     }
 }
 

@@ -1,14 +1,21 @@
 //! What speaks for an effect, and what is left with it: the plain numbers that a decision is made of.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use crate::accept::Episodes;
 use crate::fit::Fit;
 use crate::gains::Gains;
 use crate::likelihood::{Stack, trimmed_mean};
+use crate::replay::{replays, worst};
 use crate::rival::{Rival, Round};
 use crate::search::Search;
+use crate::study::Study;
+use crate::terms::lacking_force;
+use crate::touch::contact_gap;
 use crate::trial::Kind;
+use crate::units::Units;
 
 /// Of a model with an effect, beside the one without. Errors are mean squares of held-out episodes in units of noise; 1 is noise alone. What is gained is
 /// counted over fitted and held-out episodes: few are held out, and an effect has few coordinates to fit them with.
@@ -40,6 +47,11 @@ pub struct Findings {
     pub motion_share: [f64; 2],
     /// The same of the wrist's force, as a share of its size; 0 without a sensor.
     pub force_share: [f64; 2],
+    /// Without and with: the share of the square of the lacking force on the object that follows a law in its motion, its place and the time, in fitted episodes
+    /// that coefficients of the law were not fitted to (see [`crate::terms`]). Of the episodes that are worst without; 0 where too little moves to say.
+    pub lawful_share: [f64; 2],
+    /// Readings by which measured contacts begin before or after simulated ones without and with, in the median of these episodes; 0 where that is not known.
+    pub apart_readings: [f64; 2],
     /// Number of fitted and of held-out episodes.
     pub episodes: [usize; 2],
 }
@@ -47,14 +59,25 @@ pub struct Findings {
 impl Findings {
     /// Of all rivals of a round, those passed over among them, the most probable first.
     pub(crate) fn of_round(search: &Search, round: &Round, episodes: &Episodes) -> Vec<Self> {
-        let raw = search.kept.raw(&round.base.model.hypothesis(&round.base.x));
         let mut rivals: Vec<&Rival> = round.passed_over_kinds().chain(&round.rivals).collect();
         rivals.retain(|rival| !rival.heldout.costs.is_empty());
+        if rivals.is_empty() {
+            return Vec::new();
+        }
         rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        rivals.into_iter().map(|rival| Self::of(search, (round, &raw), rival, episodes)).collect()
+        let raw = search.kept.raw(&round.base.model.hypothesis(&round.base.x));
+        let groups = worst(&search.study, &round.base);
+        let without = Leftover::new(&search.study, &groups, &round.base);
+        rivals.into_iter().map(|rival| Self::of(search, (round, &raw), (&groups, &without), rival, episodes)).collect()
     }
 
-    fn of(search: &Search, (round, raw): (&Round, &Vec<Vec<f64>>), rival: &Rival, episodes: &Episodes) -> Self {
+    fn of(
+        search: &Search,
+        (round, raw): (&Round, &Vec<Vec<f64>>),
+        (groups, left): (&[Range<usize>], &Leftover),
+        rival: &Rival,
+        episodes: &Episodes,
+    ) -> Self {
         let raws = [raw, &search.kept.raw(&rival.fit.model.hypothesis(&rival.fit.x))];
         let white = |fit: &Fit, raw: &Vec<Vec<f64>>| search.kept.white(raw, fit.model.engine_errors(&fit.x));
         let [without, with] = [white(&round.base, raws[0]), white(&rival.fit, raws[1])];
@@ -69,6 +92,7 @@ impl Findings {
             let raw = search.study.raw(&rival.fit.model.hypothesis(&rival.fit.x));
             gains.add(base, &search.study.white(&raw, rival.fit.model.engine_errors(&rival.fit.x)), &episodes.fitted);
         }
+        let left_with = Leftover::new(&search.study, groups, &rival.fit);
         Self {
             effect: rival.kind().name().into(),
             log_evidence: rival.gain,
@@ -83,7 +107,32 @@ impl Findings {
             motion_after: trimmed(&with, &is_motion),
             motion_share: raws.map(|raw| search.heldout_share(raw, Kind::ObjectPosition)),
             force_share: raws.map(|raw| search.heldout_share(raw, Kind::WristForce)),
+            lawful_share: [left.lawful, left_with.lawful],
+            apart_readings: [left.apart, left_with.apart],
             episodes: [episodes.fitted.len(), episodes.heldout.len()],
+        }
+    }
+}
+
+/// What a model leaves of the episodes that are worst without an effect.
+struct Leftover {
+    /// Share of the lacking force that follows a law.
+    lawful: f64,
+    /// Readings by which contacts begin apart.
+    apart: f64,
+}
+
+impl Leftover {
+    fn new(study: &Study, groups: &[Range<usize>], fit: &Fit) -> Self {
+        let replays = replays(study, groups, fit);
+        let lacking = lacking_force(study.simulator, fit, &replays, &Units::default());
+        Self {
+            // What is no number follows none.
+            lawful: lacking
+                .map(|lacking| lacking.explained_share)
+                .filter(|share| *share > 0.0)
+                .map_or(0.0, |share| share.min(1.0)),
+            apart: contact_gap(&replays).map_or(0.0, |gap| gap.apart()),
         }
     }
 }
@@ -95,6 +144,7 @@ impl Findings {
         let white = search.kept.white(&raw, null.model.engine_errors(&null.x));
         let [motion, force] =
             [Kind::ObjectPosition, Kind::WristForce].map(|kind| [search.heldout_share(&raw, kind); 2]);
+        let left = Leftover::new(&search.study, &worst(&search.study, null), null);
         Self {
             effect: String::new(),
             log_evidence: 0.0,
@@ -109,6 +159,8 @@ impl Findings {
             motion_after: trimmed_errors(search, &white, episodes, &is_motion),
             motion_share: motion,
             force_share: force,
+            lawful_share: [left.lawful; 2],
+            apart_readings: [left.apart; 2],
             episodes: [episodes.fitted.len(), episodes.heldout.len()],
         }
     }

@@ -1,21 +1,23 @@
 //! Intervals of fitted parameters, by a bootstrap over episodes.
 //!
-//! Each resample takes as many episodes as there are, with replacement, draws the prior's mean from the prior, and makes one Gauss–Newton step
-//! from the fit. Laplace's intervals are too narrow where residuals are not as white as they should be; episodes are independent whatever happens
-//! within them. The drawn mean stands for what no episode tells (the errors of the engine, which are the same in all): for a linear model the
+//! Each resample takes as many episodes as there are, with replacement, draws the prior's mean from the prior, and makes one Newton step
+//! from the fit, as if residuals were linear. Laplace's intervals are too narrow where residuals are not as white as they should be; episodes are independent
+//! whatever happens within them. The drawn mean stands for what no episode tells (the errors of the engine, which are the same in all): for a linear model the
 //! resamples are then as wide as the posterior (randomize-then-optimize: Bardsley et al., SIAM J. Sci. Comput. 36, 2014).
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use pomdp::{Purpose, Seed};
 use rand_distr::{Distribution as _, StandardNormal, Uniform};
 
 use crate::fit::Fit;
-use crate::likelihood::{product, weights};
+use crate::linear::Linear;
 
 /// Resamples.
 const RESAMPLES: usize = 500;
+/// How many times as far a step may go as one of least squares. Where cells are far from explained that one goes half of the way.
+const LONGEST: f64 = 4.0;
 
 /// Coordinates of the resamples, each as long as the fit's; `None` for a fit that failed, or without coordinates or episodes. `groups`: places of the
 /// pieces of each episode.
@@ -25,46 +27,41 @@ pub fn bootstrap(fit: &Fit, groups: &[Range<usize>], seed: u64) -> Option<Vec<Ve
     if n == 0 || episodes == 0 || fit.log_evidence() == f64::NEG_INFINITY {
         return None;
     }
-    let weights = weights(&fit.residuals);
-    let column = |i: usize, t: usize| &fit.jacobian[i][t];
-    let sum = |group: &Range<usize>, of: &dyn Fn(usize) -> f64| group.clone().map(of).sum::<f64>();
-    let grams: Vec<DMatrix<f64>> = (groups.iter())
-        .map(|group| DMatrix::from_fn(n, n, |i, j| sum(group, &|t| product(column(i, t), column(j, t), &weights[t]))))
-        .collect();
-    let slopes: Vec<DVector<f64>> = groups
-        .iter()
-        .map(|group| DVector::from_fn(n, |i, _| sum(group, &|t| product(column(i, t), &fit.residuals[t], &weights[t]))))
-        .collect();
-    // What is left of the slope at the optimum is the solver's grain, not the data's.
-    let mean: DVector<f64> = slopes.iter().sum::<DVector<f64>>() + DVector::from_column_slice(&fit.x);
+    let pieces = Linear::new(&fit.residuals, &fit.jacobian.iter().collect::<Vec<_>>()).by_piece(fit.residuals.len());
+    // At the optimum it balances the prior: a resample moves by how far its own differs.
+    let whole: DVector<f64> = pieces.iter().map(|piece| &piece.slope).sum();
     let mut rng = Seed(seed).stream(Purpose::Statistics, 0);
     let pick = Uniform::new(0, episodes).ok()?;
     (0..RESAMPLES)
         .map(|_| {
-            let (mut gram, mut slope) = (DMatrix::identity(n, n), -&mean);
-            slope += DVector::from_column_slice(&fit.x);
+            let (mut gram, mut hessian) = (DMatrix::identity(n, n), DMatrix::identity(n, n));
+            let mut slope = -&whole;
             for _ in 0..episodes {
-                let t = pick.sample(&mut rng);
-                gram += &grams[t];
-                slope += &slopes[t];
+                for piece in &pieces[groups[pick.sample(&mut rng)].clone()] {
+                    gram += &piece.gram;
+                    hessian += &piece.hessian;
+                    slope += &piece.slope;
+                }
             }
-            for i in 0..n {
+            for slope in &mut slope {
                 let z: f64 = StandardNormal.sample(&mut rng);
-                slope[i] -= z;
+                *slope -= z;
             }
-            let delta = gram.cholesky()?.solve(&slope);
+            let delta = bounded(&gram, &hessian)?.solve(&slope);
             Some(fit.x.iter().zip(delta.iter()).map(|(x, d)| x - d).collect())
         })
         .collect()
 }
 
+/// As much of the change of weights as leaves a step at most `LONGEST` times as long as one without: far from its own optimum a resample may bend the other way.
+fn bounded(gram: &DMatrix<f64>, hessian: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    let part = |share: f64| gram * (1.0 - share) + hessian * share;
+    let bends = |share: &f64| (part(*share) - gram / LONGEST).cholesky().is_some();
+    part([1.0, 0.75, 0.5, 0.25].into_iter().find(bends).unwrap_or(0.0)).cholesky()
+}
+
 /// A model of contacts is not known better than this share of an effect, however many episodes there are.
 const SYSTEMATIC_SHARE: f64 = 0.01;
-/// Half widths of 90 % of true values, in those of the bootstrap: what the engine does wrong is the same in all episodes, which no resampling sees.
-/// 1.7 was measured on 97 intervals of the benchmark's seeds 102 (designed) and 103 (passive), with one scale an episode; with one a cell, one of
-/// the recorded logs' intervals missed by a fiftieth of its width. To be measured again.
-const TOO_NARROW: f64 = 2.0;
-
 /// The middle 90 % of a normal distribution reach so many standard deviations to either side.
 const NORMAL_90: f64 = 1.645;
 
@@ -86,7 +83,7 @@ pub fn widen(samples: &mut [Vec<f64>], fit: &Fit, share: f64, width: f64) {
         let [low, high] = middle_90(samples.iter().map(|sample| sample[index]).collect());
         let half = 0.5 * (high - low);
         if half > 0.0 {
-            let by = width * TOO_NARROW.hypot(systematic / half);
+            let by = width * half.hypot(systematic) / half;
             samples.iter_mut().for_each(|sample| sample[index] = x + by * (sample[index] - x));
         }
     }
@@ -113,9 +110,13 @@ pub fn decimals(interval: [f64; 2], value: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use pomdp::{Purpose, Seed};
 
     use super::*;
+    use crate::cells::Cells;
+    use crate::likelihood::Stack;
     use crate::model::Model;
 
     /// r = noise − s x for one tunable: what an exact fit of a linear model leaves.
@@ -151,6 +152,36 @@ mod tests {
     }
 
     #[test]
+    fn pieces_of_an_episode_are_drawn_together() {
+        let (fit, _) = linear(12, 5);
+        let pairs: Vec<Range<usize>> = (0..6).map(|t| 2 * t..2 * t + 2).collect();
+        let both = |stack: &Stack| -> Stack {
+            let joined = |pair: &Range<usize>| {
+                let values = stack[pair.clone()].iter().flat_map(|piece| piece.iter().copied());
+                DVector::from_iterator(40, values)
+            };
+            let cells = Arc::new(Cells { of: (0..40).map(|row| row / 20).collect(), count: 2, ..Cells::default() });
+            Stack::new(pairs.iter().map(joined).collect(), vec![cells; 6])
+        };
+        let Fit { model, x, residuals, jacobian, .. } = fit.clone();
+        let joined = Fit::new(model, x, Vec::new(), both(&residuals), jacobian.iter().map(both).collect());
+        let [a, b] = [bootstrap(&fit, &pairs, 3).unwrap(), bootstrap(&joined, &each(&joined), 3).unwrap()];
+        for (a, b) in a.iter().zip(&b) {
+            assert!((a[0] - b[0]).abs() < 1e-9, "{a:?} {b:?}");
+        }
+    }
+
+    #[test]
+    fn a_step_goes_as_far_as_the_change_of_weights_says_and_no_farther_than_is_bounded() {
+        let one = |value: f64| DMatrix::from_element(1, 1, value);
+        let step = |hessian: f64| 1.0 / bounded(&one(1.0), &one(hessian)).unwrap().l()[(0, 0)].powi(2);
+        assert!((step(0.5) - 2.0).abs() < 1e-12);
+        for hessian in [0.2, 0.01, 0.0, -0.5, -100.0] {
+            assert!((1.0..=LONGEST).contains(&step(hessian)), "{hessian}: {}", step(hessian));
+        }
+    }
+
+    #[test]
     fn a_fit_that_failed_has_no_resamples() {
         for broken in [f64::NAN, f64::INFINITY] {
             let (Fit { model, x, residuals, mut jacobian, .. }, _) = linear(5, 1);
@@ -167,7 +198,7 @@ mod tests {
         let mut wide = samples.clone();
         widen(&mut wide, &fit, 0.0, 1.5);
         for (sample, wide) in samples.iter().zip(&wide) {
-            assert!((wide[0] - fit.x[0] - 1.5 * TOO_NARROW * (sample[0] - fit.x[0])).abs() < 1e-12);
+            assert!((wide[0] - fit.x[0] - 1.5 * (sample[0] - fit.x[0])).abs() < 1e-12);
         }
     }
 

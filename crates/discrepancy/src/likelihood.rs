@@ -126,6 +126,14 @@ pub(crate) fn cell_weight(chi2: f64, count: usize) -> f64 {
     (1.0 + n / freedom) / (1.0 + chi2 / freedom)
 }
 
+/// By how much the weight falls with half the χ²: with the slope s of that, −ln p has the second derivative `weight` · gram − `bend` · s sᵀ.
+#[must_use]
+pub(crate) fn cell_bend(chi2: f64, count: usize) -> f64 {
+    let n = count as f64;
+    let freedom = n.max(LEAST_FREEDOM);
+    2.0 * cell_weight(chi2, count) / (freedom + chi2)
+}
+
 /// Mean square of residuals.
 #[must_use]
 pub fn mean_square(residuals: &[DVector<f64>]) -> f64 {

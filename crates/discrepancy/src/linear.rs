@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::likelihood::{Stack, cell_cost, cell_weight};
+use crate::likelihood::{Stack, cell_bend, cell_cost, cell_weight};
 
 /// Least squares at most.
 const ITERATIONS: usize = 20;
@@ -22,11 +22,22 @@ pub(crate) struct Linear {
 
 /// χ² after a step δ is `chi2` + 2 `slope`·δ + δᵀ `gram` δ.
 struct Cell {
+    episode: usize,
     count: usize,
     chi2: f64,
     slope: Vec<f64>,
     /// The lower triangle, row by row.
     gram: Vec<f64>,
+}
+
+/// Derivatives of −ln p by a step where it begins.
+pub(crate) struct Derivatives {
+    /// The first.
+    pub(crate) slope: DVector<f64>,
+    /// The second if cells kept their weights, which is never negative.
+    pub(crate) gram: DMatrix<f64>,
+    /// The second.
+    pub(crate) hessian: DMatrix<f64>,
 }
 
 /// The best step.
@@ -47,7 +58,8 @@ impl Linear {
         let mut row = vec![0.0; n];
         for (episode, (residuals, of)) in residuals.episodes() {
             let first = cells.len();
-            let empty = || Cell { count: 0, chi2: 0.0, slope: vec![0.0; n], gram: vec![0.0; n * (n + 1) / 2] };
+            let gram = || vec![0.0; n * (n + 1) / 2];
+            let empty = || Cell { episode, count: 0, chi2: 0.0, slope: vec![0.0; n], gram: gram() };
             cells.extend((0..of.count).map(|_| empty()));
             for (place, (residual, cell)) in residuals.iter().zip(&of.of).enumerate() {
                 row.iter_mut().zip(jacobian).for_each(|(value, column)| *value = column[episode][place]);
@@ -78,6 +90,33 @@ impl Linear {
         }
         gram.fill_upper_triangle_with_lower_triangle();
         (gram, slope)
+    }
+
+    /// What each of so many episodes or pieces says where the step begins.
+    pub(crate) fn by_piece(&self, count: usize) -> Vec<Derivatives> {
+        let n = self.coordinates;
+        let none =
+            || Derivatives { slope: DVector::zeros(n), gram: DMatrix::zeros(n, n), hessian: DMatrix::zeros(n, n) };
+        let mut pieces: Vec<Derivatives> = (0..count).map(|_| none()).collect();
+        for cell in &self.cells {
+            let Derivatives { slope, gram, hessian } = &mut pieces[cell.episode];
+            let weight = cell_weight(cell.chi2, cell.count);
+            // By how much the weight falls, with half the χ².
+            let bend = cell_bend(cell.chi2, cell.count);
+            let mut products = cell.gram.iter();
+            for i in 0..n {
+                slope[i] += weight * cell.slope[i];
+                for (j, product) in (0..=i).zip(&mut products) {
+                    gram[(i, j)] += weight * product;
+                    hessian[(i, j)] += weight * product - bend * cell.slope[i] * cell.slope[j];
+                }
+            }
+        }
+        for Derivatives { gram, hessian, .. } in &mut pieces {
+            gram.fill_upper_triangle_with_lower_triangle();
+            hessian.fill_upper_triangle_with_lower_triangle();
+        }
+        pieces
     }
 
     /// The step from `x`, whose coordinates have prior N(0, 1), that leads to the least −ln posterior within their ranges. `damping`: by which share the diagonal of
@@ -243,6 +282,25 @@ mod tests {
             assert!(near > found.cost - 0.02, "{near}, {}", found.cost);
         }
         assert!(linear.minimum(&[0.0, 0.0], |_| [0.0, 0.0], 0.0).unwrap().delta.norm() == 0.0);
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_cost() {
+        let (residuals, jacobian) = residuals();
+        let linear = Linear::new(&residuals, &jacobian.iter().collect::<Vec<_>>());
+        for (piece, found) in linear.by_piece(2).iter().enumerate() {
+            let one = |stack: &Stack| Stack::from(vec![stack[piece].clone()]);
+            let alone = Linear::new(&one(&residuals), &jacobian.each_ref().map(one).iter().collect::<Vec<_>>());
+            let at = |a: f64, b: f64| alone.cost(&DVector::from_vec(vec![a, b]));
+            let h = 1e-3;
+            let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-3 * (1.0 + b.abs()), "{piece}: {a} {b}");
+            close(found.slope[1], (at(0.0, h) - at(0.0, -h)) / (2.0 * h));
+            let bent = (at(h, 0.0) - 2.0 * at(0.0, 0.0) + at(-h, 0.0)) / (h * h);
+            close(found.hessian[(0, 0)], bent);
+            close(found.hessian[(0, 1)], (at(h, h) - at(h, -h) - at(-h, h) + at(-h, -h)) / (4.0 * h * h));
+            // In the one that a step explains the change of weights counts.
+            assert!(piece == 1 || (found.gram[(0, 0)] - bent).abs() > 0.1 * bent.abs(), "{bent}");
+        }
     }
 
     #[test]

@@ -141,7 +141,7 @@ pub struct Report {
     pub probabilities: Probabilities,
     /// What speaks for each effect that each round of the search compared: what the decision is made of.
     pub findings: Vec<Vec<Findings>>,
-    /// By how much intervals are wider than those that our own engine's logs ask for, see [`Decision::width`].
+    /// By how much intervals are wider than those of the bootstrap, see [`Decision::width`].
     pub interval_width: f64,
     /// The nominal model, re-tuned.
     pub retuned: Vec<Retuned>,

@@ -5,6 +5,7 @@
 //! Proctor & Kutz, PNAS 113, 2016, by Efroymson's steps instead of thresholds). Episodes are left out, never single windows: what an episode does lasts.
 
 use nalgebra::{DMatrix, DVector};
+use physics_model::EffectConfig;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
 
@@ -34,7 +35,7 @@ const LEAST_SHARE: f64 = 0.03;
 const MOST: f64 = 0.5;
 /// Windows and episodes that say anything.
 const LEAST: [usize; 2] = [40, 6];
-/// Force on the object that the re-tuned nominal model lacks, and what it follows. Base axes.
+/// Force on the object that a model lacks, the re-tuned nominal one in reports, and what it follows. Base axes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LackingForce {
     /// Windows of some hundredths of a second in which the object moves.
@@ -292,8 +293,7 @@ fn describe(episodes: &[Vec<Window>], axes: usize, units: &Units) -> Option<Lack
     })
 }
 
-/// What force a fit lacks in replayed episodes; `None` where too little moves to say.
-/// In units of which `units` says how much one of today's is.
+/// What force a fit lacks in replayed episodes; `None` where too little moves to say. In units of which `units` says how much one of today's is.
 pub(crate) fn lacking_force(
     simulator: &Simulator,
     fit: &Fit,
@@ -304,13 +304,18 @@ pub(crate) fn lacking_force(
     let hypothesis = fit.model.hypothesis(&fit.x);
     let engine = nominal.engine();
     let (rolls, gravity_mps2) = (nominal.rolls(), nominal.header().gravity_mps2);
+    // Another friction takes the nominal one's place. A friction or a mass that changes on the way counts as the nominal one.
+    let level = hypothesis.effects.iter().find_map(|effect| match effect {
+        EffectConfig::FrictionLevel(level) => Some(level.coefficient),
+        _ => None,
+    });
     let windows = |replay: &Replay| {
         let Replay { trial, start, readings } = replay;
         let phases = trial.phases(readings, rolls, gravity_mps2);
         let object = nominal.object(&hypothesis.z, trial.added_mass_kg, &engine);
         let mass_kg = object.mass_kg + object.added_mass_kg;
         let slides = nominal.has_tool() && !rolls;
-        let friction_n = if slides { object.friction * mass_kg * gravity_mps2 } else { 0.0 };
+        let friction_n = if slides { level.unwrap_or(object.friction) * mass_kg * gravity_mps2 } else { 0.0 };
         trial.windows(start, readings, &phases, mass_kg, friction_n)
     };
     let episodes: Vec<Vec<Window>> = episodes.iter().map(|pieces| pieces.iter().flat_map(windows).collect()).collect();

@@ -52,6 +52,9 @@ pub struct Onset {
     pub after_m: [f64; 3],
     /// Time between two readings, s: their median.
     pub reading_secs: f64,
+    /// Time by which they begin apart, s, whichever is first: its median.
+    #[serde(skip)]
+    pub(crate) apart_secs: f64,
 }
 
 impl ContactGap {
@@ -71,6 +74,12 @@ impl ContactGap {
         let part = if middle > 0.0 { self.only_simulated } else { self.only_measured };
         let apart = low * high > 0.0 && middle.abs() > READINGS * onset.reading_secs;
         (apart && part.square > TOLD).then_some((onset, part))
+    }
+
+    /// By how many readings first contacts begin apart in the median episode; 0 where that is not known.
+    pub(crate) fn apart(&self) -> f64 {
+        let apart = self.onset.map_or(0.0, |onset| onset.apart_secs / onset.reading_secs);
+        if apart.is_finite() { apart } else { 0.0 }
     }
 
     /// What to do about it; `None` where it is little of what is left.
@@ -179,6 +188,7 @@ fn onset(episodes: &[Vec<Touch>]) -> Option<Onset> {
         after_secs: quarters(0),
         after_m: quarters(1),
         reading_secs,
+        apart_secs: Data::new(after.iter().map(|[secs, _]| secs.abs()).collect::<Vec<f64>>()).median(),
     })
 }
 
@@ -249,6 +259,18 @@ mod tests {
         let sentence = early.sentence().unwrap();
         assert!(sentence.contains("before simulated") && sentence.contains("clocks of force"), "{sentence}");
         assert!(early.next_experiment().unwrap().contains("clocks"));
+    }
+
+    #[test]
+    fn contacts_of_a_tool_that_is_elsewhere_begin_apart_though_half_of_them_are_early() {
+        let secs = [0.1, -0.1, 0.1, -0.1, 0.1, -0.1];
+        let gap = of_touches(&secs.map(|later| push(0.05, 0.0, later))).unwrap();
+        assert!((gap.apart() - 10.0).abs() < 1.1, "{gap:?}");
+        let same = of_touches(&SPEEDS.map(|speed| push(speed, 0.0, 0.0))).unwrap();
+        assert_eq!(same.apart(), 0.0);
+        // Without a contact in both nothing is known.
+        let none = of_touches(&[0.0; 6].map(|_| push(0.0, 0.0, 0.0)));
+        assert_eq!(none.map_or(0.0, |gap| gap.apart()), 0.0);
     }
 
     #[test]

@@ -20,7 +20,7 @@ fn log(set: &str) -> Log {
 
 fn report(log: &Log) -> Report {
     // What cannot change an answer cannot change that of a short search either.
-    within(log, &Settings { rollouts: 2000, most: 2100, limit: 2300, ..Settings::default() })
+    within(log, &Settings { rollouts: 2600, most: 2700, limit: 2900, ..Settings::default() })
 }
 
 fn within(log: &Log, budget: &Settings) -> Report {

@@ -31,6 +31,9 @@ struct Arguments {
     /// Folder for the table of each engine, left out of what judges it.
     #[arg(long)]
     table: Option<PathBuf>,
+    /// Begins from this decision, which had learnt from other logs: its weights change little, and what it did not know is learnt.
+    #[arg(long, conflicts_with = "unseen")]
+    from: Option<PathBuf>,
     /// Judges by this decision, which was made from other logs, instead of learning one: unseen logs.
     #[arg(long, conflicts_with = "out")]
     unseen: Option<PathBuf>,
@@ -71,12 +74,13 @@ fn run(arguments: &Arguments) -> Result<()> {
             engines.len()
         );
     }
-    let provenance = provenance(arguments, &examples);
+    let earlier = arguments.from.as_deref().map(begun_from).transpose()?;
+    let provenance = provenance(arguments, &examples, earlier.as_ref());
     let withheld = examples.iter().filter_map(Example::without_truth);
     let all: Vec<Example> = examples.iter().cloned().chain(withheld).collect();
     let judged = match &arguments.unseen {
         Some(path) => unseen(path, &all)?,
-        None => leave_one_engine_out(&examples, &all),
+        None => leave_one_engine_out(&examples, &all, earlier.as_ref()),
     };
     let (withheld, judged): (Vec<_>, Vec<_>) = judged.into_iter().partition(|judgement| judgement.example.withheld);
     let of = |engine: &str| -> Vec<Judgement> {
@@ -98,18 +102,38 @@ fn run(arguments: &Arguments) -> Result<()> {
     }
     if let Some(out) = &arguments.out {
         let all: Vec<&Example> = examples.iter().collect();
-        write(out, &(serde_json::to_string_pretty(&learn(&all, provenance))? + "\n"))?;
+        write(out, &(serde_json::to_string_pretty(&learn(&all, earlier.as_ref(), provenance))? + "\n"))?;
     }
     Ok(())
+}
+
+/// A decision to begin from.
+fn begun_from(path: &std::path::Path) -> Result<Decision> {
+    let decision: Decision = diagnose_benchmark::folder::read(path)?;
+    let scores = [
+        ("effect", &decision.effect, decision.effect_features.len()),
+        ("none", &decision.none, decision.log_features.len()),
+        ("unknown", &decision.unknown, decision.log_features.len()),
+    ];
+    for (key, score, features) in scores {
+        let found = score.weights.len();
+        if found != features {
+            bail!(
+                "{}: key `{key}.weights`: expected {features} numbers, one for each feature, found {found}",
+                path.display()
+            );
+        }
+    }
+    Ok(decision)
 }
 
 /// Every example with the probabilities of a decision that was made from other logs.
 fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<Judgement<'a>>> {
     let decision: Decision = diagnose_benchmark::folder::read(path)?;
-    let seen = |example: &Example| {
-        let sets = decision.provenance["sets"].as_array();
-        sets.into_iter().flatten().any(|set| set["seed"].as_u64() == Some(example.truth.seed))
-    };
+    // What it began from has seen its own.
+    let chain = std::iter::successors(Some(&decision.provenance), |of| of.get(BEGUN_FROM));
+    let sets: Vec<&serde_json::Value> = chain.filter_map(|of| of["sets"].as_array()).flatten().collect();
+    let seen = |example: &Example| sets.iter().any(|set| set["seed"].as_u64() == Some(example.truth.seed));
     if let Some(example) = examples.iter().find(|example| seen(example)) {
         bail!(
             "{}: seed {} served to make {}: expected logs of another seed",
@@ -126,7 +150,10 @@ fn write(path: &std::path::Path, text: &str) -> Result<()> {
     written.map(|_| ()).map_err(|error| Failed(format!("{error}: {}", error.source).into()).into())
 }
 
-fn provenance(arguments: &Arguments, examples: &[Example]) -> serde_json::Value {
+/// The key of a provenance with that of the decision that another one began from.
+const BEGUN_FROM: &str = "begun_from";
+
+fn provenance(arguments: &Arguments, examples: &[Example], earlier: Option<&Decision>) -> serde_json::Value {
     let mut sets: Vec<(String, u64, usize)> = Vec::new();
     for example in examples {
         let name = format!("{} {}", example.truth.engine, example.truth.variant);
@@ -141,14 +168,18 @@ fn provenance(arguments: &Arguments, examples: &[Example]) -> serde_json::Value 
     let sets: Vec<_> = (sets.iter())
         .map(|(engine, seed, logs)| serde_json::json!({ "engine": engine, "seed": seed, "logs": logs }))
         .collect();
-    serde_json::json!({
+    let mut provenance = serde_json::json!({
         "command": "diagnose-learn",
         "version": env!("CARGO_PKG_VERSION"),
         "generator": "tests/peers/worlds/make_logs.py",
         "folders": folders,
         "sets": sets,
         "logs": examples.len(),
-    })
+    });
+    if let Some(earlier) = earlier {
+        provenance[BEGUN_FROM] = earlier.provenance.clone();
+    }
+    provenance
 }
 
 fn markdown(table: &Table) -> String {
@@ -198,6 +229,11 @@ fn markdown(table: &Table) -> String {
     );
     let _ =
         writeln!(text, "\nOf {} logs with 11 episodes or fewer {} got a wrong and sure name.", all.few[0], all.few[1]);
+    if table.provenance.get(BEGUN_FROM).is_some() {
+        text.push_str(
+            "\nThe decision that these began from had learnt from all engines: no engine was left out of that.\n",
+        );
+    }
     text
 }
 

@@ -52,9 +52,9 @@ fn logistic(names: &[&str], examples: &[(Vec<f64>, bool)]) -> Logistic {
         Choice { alternatives: vec![row, none], chosen: usize::from(!is), weight: 1.0 }
     };
     let choices: Vec<Choice> = examples.iter().map(choice).collect();
-    let mut variances = vec![1.0; names.len() + 1];
-    variances[0] = OFFSET;
-    fitted.weights = choice::fit(&choices, &variances).as_slice().to_vec();
+    let mut priors = vec![(0.0, 1.0); names.len() + 1];
+    priors[0].1 = OFFSET;
+    fitted.weights = choice::fit(&choices, &priors).as_slice().to_vec();
     fitted
 }
 
