@@ -49,7 +49,11 @@ impl Search<'_> {
     /// which may have found nothing.
     pub(crate) fn chain(&mut self, screening: &Screening, null: &Fit) -> Vec<Link> {
         let (mut links, mut gained) = (Vec::new(), 0.0);
-        self.reserve = self.to_compare(null);
+        // What is done with them in the end: to learn errors, and to fit the model without them.
+        let simulations = self.study.simulations_to_learn();
+        self.reserve = simulations
+            * (self.study.rollouts() + self.kept.rollouts() + self.reported.as_ref().map_or(0, Study::rollouts))
+            + (null.model.tunables + STEPS + 1) * self.study.rollouts();
         let (mut part, mut at) = (self.part.clone(), null.clone());
         while at.model.parts.len() < self.settings.effects && self.affords_one_more(&part, &at.model) {
             if at.model.parts.len() == LEAST {
@@ -72,17 +76,6 @@ impl Search<'_> {
         }
         self.reserve = 0;
         links
-    }
-
-    /// Simulated episodes that it takes to compare anything with the nominal model in all episodes: errors are learnt, and that model is fitted.
-    pub(crate) fn to_compare(&self, null: &Fit) -> usize {
-        self.to_learn() + (null.model.simulated() + STEPS + 1) * self.study.rollouts()
-    }
-
-    /// The same of errors alone.
-    pub(crate) fn to_learn(&self) -> usize {
-        let learnt = self.study.rollouts() + self.kept.rollouts() + self.reported.as_ref().map_or(0, Study::rollouts);
-        self.study.simulations_to_learn() * learnt
     }
 
     /// What could be added to `base`, which knows the episodes of the screening alone, as `part` does. `known`: what was compared before.

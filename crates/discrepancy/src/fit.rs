@@ -11,8 +11,6 @@ use crate::study::{Study, difference};
 
 /// Steps between two fresh Jacobians, at most.
 pub(crate) const STEPS: usize = 5;
-/// Jacobians of a fit with care, at most.
-pub(crate) const ROUNDS: usize = 3;
 /// A fresh Jacobian that gained less than this in ln posterior is not followed by another one.
 const SETTLED: f64 = 1.0;
 /// After a step that gains nothing the next one is damped by this at least: less leads to the same place.
@@ -142,7 +140,7 @@ pub fn fit(study: &Study, model: Model, begin: Begin, effort: Effort) -> Fit {
     complete(study, &model, &x, (&raw, &residuals), &mut jacobian);
     let rounds = match effort {
         Effort::Quick => 1,
-        Effort::Full => ROUNDS,
+        Effort::Full => 3,
     };
     let simulation = study.rollouts();
     let mut before = f64::INFINITY;

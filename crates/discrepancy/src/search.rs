@@ -9,7 +9,7 @@ use crate::accept::{Asked, Episodes, better_heldout, both_convince, convinces, l
 use crate::candidate::Candidate;
 use crate::chain::{LEAST_SHARE, Link};
 use crate::diagnosis::Settings;
-use crate::fit::{Begin, Effort, Fit, ROUNDS, STEPS, fit};
+use crate::fit::{Begin, Effort, Fit, STEPS, fit};
 use crate::likelihood::{Stack, mean_square, trimmed_mean};
 use crate::locate::{Cell, locate};
 use crate::model::Model;
@@ -110,10 +110,7 @@ impl Search<'_> {
         links.truncate(1);
         while rounds.is_empty() || (accepted.model.parts.len() < settings.effects && within(self)) {
             let compared = rounds.last().map_or_else(Vec::new, Round::fits);
-            // Quick fits leave enough for the best of them to be compared in all episodes.
-            self.reserve = if rounds.is_empty() { self.to_compare(null) } else { 0 };
             let known = links.pop().unwrap_or_else(|| self.beside(screening, &accepted, &compared));
-            self.reserve = 0;
             let mut round = self.round(screening, &accepted, known);
             let mut found = settings.effects > 0 && self.choose(&mut round, episodes, explained);
             if !found && round.hasty {
@@ -323,8 +320,7 @@ impl Search<'_> {
         let first = base.model.parts.is_empty();
         let Link { promises, mut quick, base: begin, .. } = link;
         let before = begin.log_evidence();
-        let affords_care = self.affords_care(base, quick.first());
-        let base = if first { self.without_effect(base, quick.first(), affords_care) } else { base.clone() };
+        let base = if first { self.without_effect(base, quick.first()) } else { base.clone() };
         let kinds = if first { self.settings.quick_fits } else { self.settings.fits };
         of_first(&mut quick, kinds, added_kind);
         let first_kind = quick.first().and_then(added_kind);
@@ -333,8 +329,7 @@ impl Search<'_> {
         let share = self.share(screening);
         // Where the best alone leaves much of the episodes of the screening, a second effect is the question, not by how much the first one leads.
         let hasty = first && quick.first().is_some_and(|best| leaves_much(best, &self.part, self.settings));
-        // Where the budget does not suffice to fit the model without an effect with care, those with one are not fitted so either.
-        let effort = if hasty || (first && !affords_care) { Effort::Quick } else { Effort::Full };
+        let effort = if hasty { Effort::Quick } else { Effort::Full };
         let fully = |quick: Fit| -> Rival {
             if !self.affords(&self.study, &quick.model) {
                 return Rival {
@@ -417,18 +412,11 @@ impl Search<'_> {
 
     /// The model without an effect, which knew the episodes of the screening alone, fitted to all. How large errors are is learnt where the model is nearly
     /// right: with what explains most, if that gains much.
-    fn without_effect(&mut self, base: &Fit, best: Option<&Fit>, affords_care: bool) -> Fit {
+    fn without_effect(&mut self, base: &Fit, best: Option<&Fit>) -> Fit {
         let best = best.filter(|best| best.log_evidence() - base.log_evidence() > FAR);
         self.learn_errors(best.unwrap_or(base));
-        let effort = if best.is_some() || !affords_care { Effort::Quick } else { Effort::Full };
+        let effort = if best.is_some() { Effort::Quick } else { Effort::Full };
         fit(&self.study, base.model.clone(), Begin::at(&base.x), effort)
-    }
-
-    /// Whether the budget suffices to fit the model without an effect to all episodes with care, and the best one with an effect at all.
-    fn affords_care(&self, base: &Fit, best: Option<&Fit>) -> bool {
-        let careful = ROUNDS * (base.model.simulated() + STEPS);
-        let quick = best.map_or(0, |best| best.model.simulated() + STEPS + 1);
-        self.study.affords((careful + quick) * self.study.rollouts() + self.to_learn())
     }
 
     /// Learns in all episodes how large errors are where a model is right.
