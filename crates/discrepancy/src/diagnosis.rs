@@ -127,9 +127,9 @@ impl Default for Settings {
             threshold_rolling: 20.0,
             effects: 2,
             effects_thrown: 4,
-            rollouts: 3900,
-            most: 4200,
-            limit: 4540,
+            rollouts: 4000,
+            most: 4300,
+            limit: 4800,
             unexplained: 1.4,
             // Seed 7: a pair's second effect stands out at 0.002 or less, but for one of 11; what two spurious ones were found for, at 0.14 and 0.87.
             another: 0.05,

@@ -172,8 +172,6 @@ fn power(unit: &str, mass: f64, length: f64) -> f64 {
 #[test]
 fn masses_and_forces_may_be_in_any_unit() {
     let set = "set-009";
-    // A shorter search ends before it has an effect to name.
-    let report = |log: &Log| within(log, &Settings { rollouts: 2600, most: 2700, limit: 2900, ..Settings::default() });
     let light = report(&heavier(log(set), 1e-3));
     assert!(!light.effects.is_empty(), "{set}: {}", light.summary);
     let heavy = report(&heavier(log(set), 1e3));

@@ -194,8 +194,8 @@ fn parse_override(text: &str) -> Result<Table, Error> {
     }
     toml::from_str(&format!("{key} = {value}")).or_else(|_| {
         // What begins as a list, a table or a text in quotes has to be one.
-        let is_none = toml::from_str::<Table>(&format!("x = {value}")).is_err();
-        if is_none && value.starts_with(['[', '{', '"', '\'']) {
+        let broken = toml::from_str::<Table>(&format!("x = {value}")).is_err();
+        if broken && value.starts_with(['[', '{', '"', '\'']) {
             return Err(Error::OverrideValue { text: one_line(text, QUOTED) });
         }
         // A bare word is a string: `--set preset=paper` needs no quotes.
