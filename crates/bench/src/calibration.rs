@@ -11,7 +11,7 @@ mod table;
 use std::path::{Path, PathBuf};
 
 use agent::Network;
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 use rayon::prelude::*;
 use scenario::{Problem, Selection};
 use serde_json::{Value, json};
@@ -40,6 +40,9 @@ pub struct Task {
     pub prior: Option<PathBuf>,
 }
 
+/// What is written beside the worlds.
+const RESULTS: [&str; 4] = ["calibration.json", "calibration.md", "calibration.svg", "calibration.png"];
+
 /// Plays the worlds that `out` does not have yet, and writes `calibration.json`, `calibration.md` and pictures there.
 ///
 /// # Errors
@@ -61,6 +64,9 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
             .with_context(|| format!("{} is no task of this benchmark: move it away", own.display()))?;
         ensure!(found == identity, "{} holds the worlds of another task: choose another folder", out.display());
     } else {
+        if let Some(file) = RESULTS.iter().find(|file| out.join(file).exists()) {
+            bail!("{} holds {file}, which this benchmark did not write: choose another folder", out.display());
+        }
         std::fs::create_dir_all(out.join("worlds"))
             .with_context(|| format!("cannot make the folder {}", out.display()))?;
         whole_file::write(&own, pretty(&identity).as_bytes(), Existing::Keep)?;

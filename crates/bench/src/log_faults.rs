@@ -8,7 +8,7 @@ mod spoil;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, bail};
 use log_check::{Check, Kind, Reading, check};
 use measured_log::{Channel, Format, Log, Notes};
 use rayon::prelude::*;
@@ -164,6 +164,10 @@ fn read(folders: &[PathBuf]) -> Result<Vec<(PathBuf, Log)>> {
 ///
 /// As [`run`], and a folder that is there or cannot be written.
 pub fn write(folders: &[PathBuf], out: &Path) -> Result<usize> {
+    whole_file::check_folder(out)?;
+    if std::fs::read_dir(out).is_ok_and(|mut inside| inside.next().is_some()) {
+        bail!("{}: expected a new folder for the spoilt logs, found one that holds something", out.display());
+    }
     let mut count = 0;
     for (folder, log) in read(folders)? {
         let name = name(&folder).replace(['/', '\\'], "-");

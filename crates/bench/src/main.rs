@@ -145,7 +145,7 @@ enum What {
         #[arg(long)]
         json: bool,
     },
-    /// How often `log check` sees what is wrong with a log: spoils good ones in 28 ways.
+    /// How often `log check` sees what is wrong with a log: spoils good ones in up to 32 ways.
     #[command(
         after_help = "Examples:\n  cargo xtask bench log-check tests/data/mujoco-logs/logs/set-002 tests/data/mujoco-logs/logs/set-003"
     )]

@@ -36,8 +36,8 @@ fn main() -> ExitCode {
     match run(&program::parse()) {
         Ok(code) => code,
         Err(error) => {
-            program::complain(&*error);
-            let bad_input = error.is::<Taken>() || error.is::<scenario::Error>();
+            program::complain(&error);
+            let bad_input = error.is::<Taken>() || error.is::<scenario::Error>() || program::is_denied(&error);
             if bad_input { ExitCode::from(2) } else { ExitCode::FAILURE }
         }
     }

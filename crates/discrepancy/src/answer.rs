@@ -1,10 +1,11 @@
 //! What a diagnosis leaves behind, whoever asked for it: `report.json`, `report.html`, `model.toml`, and the model as files of other simulators.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use measured_log::Log;
 use simulator_files::{mjcf, urdf};
-use whole_file::{Existing, Owner};
+use whole_file::{Claim, Existing, Owner};
 
 use crate::diagnosis::{Diagnosis, Settings};
 use crate::error::Error;
@@ -67,14 +68,14 @@ impl Answer {
         page(&self.name, &self.report)
     }
 
-    /// Writes [`FILES`] into a folder that is there and may be written to (see [`check_place`]).
+    /// Writes [`FILES`] into a folder that was claimed for them (see [`check_place`]).
     ///
     /// # Errors
     ///
     /// [`Error::Write`] where the system refuses, [`Error::Model`] for a value that a file cannot hold.
-    pub fn write(&self, out: &Path, owner: &Owner) -> Result<(), Error> {
+    pub fn write(&self, place: &Claim) -> Result<(), Error> {
+        let out = place.folder();
         let texts = [self.model.to_toml()?, self.page(), self.json()?];
-        owner.claim(out)?;
         for (file, text) in FILES.into_iter().zip(self.simulators.iter().chain(&texts)) {
             whole_file::write(&out.join(file), text.as_bytes(), Existing::Replace)?;
         }
@@ -99,13 +100,43 @@ pub fn check_place(out: &Path, owner: &Owner) -> Result<(), Error> {
     free.map_err(|source| Error::Taken { source })
 }
 
-/// Makes the folder `out` and those above it; the ones that were made.
-///
-/// # Errors
-///
-/// [`Error::Folder`] where the system refuses.
-pub fn make_place(out: &Path) -> Result<Vec<PathBuf>, Error> {
-    let made = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
-    std::fs::create_dir_all(out).map_err(|source| Error::Folder { path: out.into(), source })?;
-    Ok(made)
+/// A folder for an answer, with those above it that were made for it.
+#[derive(Debug)]
+pub struct Place {
+    /// The folder, claimed.
+    pub claim: Claim,
+    made: Vec<PathBuf>,
+}
+
+impl Place {
+    /// Makes the folder `out` and those above it, and claims it.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Folder`] where the system refuses, [`Error::Taken`] where another program writes there.
+    pub fn make(out: &Path, owner: &Owner) -> Result<Self, Error> {
+        let made: Vec<PathBuf> = out.ancestors().take_while(|path| !path.exists()).map(Path::to_path_buf).collect();
+        std::fs::create_dir_all(out).map_err(|source| Error::Folder { path: out.into(), source })?;
+        match owner.claim(out) {
+            Ok(claim) => Ok(Self { claim, made }),
+            Err(source) => {
+                remove(&made);
+                Err(match source.source.kind() {
+                    ErrorKind::AlreadyExists => Error::Taken { source },
+                    _ => Error::Write { source },
+                })
+            }
+        }
+    }
+
+    /// Leaves nothing behind.
+    pub fn give_up(self) {
+        self.claim.give_up();
+        remove(&self.made);
+    }
+}
+
+/// Removes folders, as far as they are empty.
+fn remove(folders: &[PathBuf]) {
+    folders.iter().for_each(|path| drop(std::fs::remove_dir(path)));
 }

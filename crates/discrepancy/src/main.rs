@@ -1,11 +1,12 @@
 //! `cargo xtask diagnose`: where simulation and measurement disagree, and which effect is missing.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use clap::Parser;
-use discrepancy::answer::{FILES, check_place, make_place, owner};
+use discrepancy::answer::{FILES, Place, check_place, owner};
 use discrepancy::interval::decimals;
 use discrepancy::{Answer, Error, ModelFile, Nominal, Report, Settings, Verdict, diagnose_watched, rig_tool};
 use measured_log::Robot;
@@ -70,13 +71,13 @@ impl Arguments {
 }
 
 fn main() -> ExitCode {
-    // 2 is bad input; a disk that refuses is a failure.
-    program::end(
-        run(&program::parse()),
-        |error| {
-            if let Error::Write { .. } | Error::Folder { .. } = error { 1 } else { 2 }
-        },
-    )
+    // 2 is bad input, such as a place that may not be written; a disk that refuses is a failure.
+    program::end(run(&program::parse()), |error| match error {
+        Error::Write { source: whole_file::Error { source, .. } } | Error::Folder { source, .. } => {
+            if source.kind() == ErrorKind::PermissionDenied { 2 } else { 1 }
+        }
+        _ => 2,
+    })
 }
 
 #[expect(clippy::disallowed_methods, reason = "the report says how long it took; nothing depends on it")]
@@ -109,17 +110,21 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
     };
     // Before a minute is spent on what could not be written.
     check_place(&out, &owner)?;
-    let made = make_place(&out)?;
-    let clean = || made.iter().for_each(|path| drop(std::fs::remove_dir(path)));
-    check_writable(&out).inspect_err(|_| clean())?;
+    let place = Place::make(&out, &owner)?;
     let settings = Settings { seed: arguments.seed, fold: arguments.fold, ..Settings::default() };
     let name = measured.display().to_string();
     // A log that says too little leaves nothing behind.
     let watched = diagnose_watched(&log, &name, &nominal, &settings, &bar::Bar::new());
-    let diagnosis = watched.inspect_err(|_| clean())?;
+    let diagnosis = match watched {
+        Ok(diagnosis) => diagnosis,
+        Err(error) => {
+            place.give_up();
+            return Err(error);
+        }
+    };
     let begun = begun.as_ref().map(|(name, model)| (name.as_str(), model));
     let answer = Answer::new((&name, &log), &nominal, &diagnosis, &settings, begun, started.elapsed().as_secs_f64());
-    answer.write(&out, &owner)?;
+    answer.write(&place.claim)?;
     if arguments.json {
         program::show(&answer.json()?);
     } else {
@@ -152,13 +157,6 @@ fn begin_with(path: &Path, out: &Path, nominal: &mut Nominal) -> Result<ModelFil
     }
     model.apply_as(&path.display().to_string(), nominal)?;
     Ok(model)
-}
-
-/// Whether the results can be written: a disk may refuse.
-fn check_writable(out: &Path) -> Result<(), Error> {
-    let probe = out.join(format!(".writable-{}", std::process::id()));
-    let written = std::fs::write(&probe, "").and_then(|()| std::fs::remove_file(&probe));
-    written.map_err(|source| Error::Folder { path: probe, source })
 }
 
 /// Parts of a cross-validation, at most.

@@ -54,7 +54,7 @@ fn sentence(error: &Error) -> Option<String> {
     let said = error.source()?.to_string();
     // A sign is all that is wrong with it.
     let negative = value.strip_prefix('-').is_some_and(|digits| digits.parse::<u64>().is_ok());
-    let expected = match range(&said) {
+    let expected = match range(&said, &value) {
         Some(range) => range,
         None if negative && said.starts_with("invalid digit") => "expected a whole number, 0 or more".into(),
         None => one_line(&plain(&said), 1000),
@@ -66,10 +66,11 @@ fn sentence(error: &Error) -> Option<String> {
 }
 
 /// The range that a number is not in, as `5 is not in 1..=4` says.
-fn range(said: &str) -> Option<String> {
+fn range(said: &str, value: &str) -> Option<String> {
     let (low, high) = said.split_once(" is not in ")?.1.split_once("..=")?;
     let high: u64 = high.parse().ok()?;
-    Some(if high >= ENDLESS {
+    let is_above = value.parse::<u128>().is_ok_and(|value| value > u128::from(high));
+    Some(if high >= ENDLESS && !is_above {
         format!("expected a whole number, {low} or more")
     } else {
         format!("expected a whole number, {low} to {high}")
@@ -122,7 +123,7 @@ mod tests {
             ("--trial -1", "--trial <TRIAL>: expected a whole number, 0 or more, found `-1`"),
             ("--trial x", "--trial <TRIAL>: expected a whole number, found `x`"),
             ("--trial 1.5", "--trial <TRIAL>: expected a whole number, found `1.5`"),
-            ("--trial 5000000000", "--trial <TRIAL>: expected a whole number, 0 or more, found `5000000000`"),
+            ("--trial 5000000000", "--trial <TRIAL>: expected a whole number, 0 to 4294967295, found `5000000000`"),
             ("--seed -1", "--seed <SEED>: expected a whole number, 0 or more, found `-1`"),
             (
                 "--seed 99999999999999999999",

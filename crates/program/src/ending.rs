@@ -23,10 +23,22 @@ impl Failed {
 /// The exit code of an error: 1 where it is marked as [`Failed`], else 2. A place that may not be read or written is a bad place, whenever that shows.
 #[must_use]
 pub fn code(error: &anyhow::Error) -> u8 {
+    if error.is::<Failed>() && !is_denied(error) { 1 } else { 2 }
+}
+
+/// Whether a cause is a place that may not be read or written.
+#[must_use]
+pub fn is_denied(error: &anyhow::Error) -> bool {
     let denied = |cause: &(dyn std::error::Error + 'static)| {
         cause.downcast_ref::<io::Error>().is_some_and(|e| e.kind() == io::ErrorKind::PermissionDenied)
     };
-    if error.is::<Failed>() && !error.chain().any(denied) { 1 } else { 2 }
+    error.chain().any(denied)
+}
+
+/// Marks what went wrong after the input was found to be good as [`Failed`] by its own words, unless a place may not be written.
+pub fn failed(error: impl Into<anyhow::Error>) -> anyhow::Error {
+    let error = error.into();
+    if is_denied(&error) { error } else { Failed(format!("{error:#}").into()).into() }
 }
 
 /// Ends a program: says why where it went wrong.
@@ -72,6 +84,10 @@ mod tests {
         let denied = anyhow::Error::new(io::Error::from(io::ErrorKind::PermissionDenied)).context(mark.clone());
         assert_eq!(code(&denied), 2);
         assert_eq!(code(&mark.into()), 1);
+        let refused = |kind: io::ErrorKind| failed(io::Error::from(kind));
+        assert_eq!(code(&refused(io::ErrorKind::PermissionDenied)), 2);
+        let full = refused(io::ErrorKind::StorageFull);
+        assert_eq!((code(&full), full.to_string()), (1, io::Error::from(io::ErrorKind::StorageFull).to_string()));
         assert_eq!(code(&anyhow!("the run stopped")), 2);
     }
 }

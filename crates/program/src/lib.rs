@@ -21,7 +21,7 @@ mod terminal;
 mod work;
 
 pub use arguments::parse;
-pub use ending::{Failed, code, end, finish, resumable};
+pub use ending::{Failed, code, end, failed, finish, is_denied, resumable};
 pub use next::{next, typed};
 pub use terminal::{complain, print, say, show};
 #[cfg(feature = "long-work")]

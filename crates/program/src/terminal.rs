@@ -33,7 +33,14 @@ pub fn say(text: &str) {
 
 /// Says why a program ends: one line, whatever names and files are quoted in it.
 pub fn complain(error: &dyn Display) {
-    say(&format!("error: {}", one_line(&without_codes(&format!("{error:#}")), 4000)));
+    say(&format!("error: {}", one_line(&without_repeats(&without_codes(&format!("{error:#}"))), 4000)));
+}
+
+/// An error that says its cause, and has it as its cause, says it twice.
+fn without_repeats(text: &str) -> String {
+    let mut parts: Vec<&str> = text.split(": ").collect();
+    parts.dedup();
+    parts.join(": ")
 }
 
 /// Without the numbers that the operating system's words end with, ` (os error 2)`, which say nothing more.
@@ -64,6 +71,12 @@ macro_rules! say {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cause_is_said_once() {
+        assert_eq!(without_repeats("cannot read a: no such file: no such file"), "cannot read a: no such file");
+        assert_eq!(without_repeats("a: b: a"), "a: b: a");
+    }
 
     #[test]
     fn what_the_system_says_comes_without_its_number() {

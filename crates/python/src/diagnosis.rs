@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use discrepancy::answer::{check_place, make_place, owner};
+use discrepancy::answer::{Place, check_place, owner};
 use discrepancy::{Answer, ModelFile, Settings, diagnose_watched};
 use pyo3::prelude::*;
 
@@ -78,8 +78,7 @@ impl Diagnosis {
         let owner = owner(Path::new(&self.answer.name));
         let written = py.detach(|| {
             check_place(&folder, &owner)?;
-            make_place(&folder)?;
-            self.answer.write(&folder, &owner)
+            self.answer.write(&Place::make(&folder, &owner)?.claim)
         });
         written.map_err(|error| exception(&error))
     }

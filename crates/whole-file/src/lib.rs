@@ -22,8 +22,8 @@ use std::panic::{UnwindSafe, catch_unwind, set_hook, take_hook};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-pub use owner::{Owner, check_owner};
-pub use place::{check_file, check_folder};
+pub use owner::{Claim, Owner, check_owner};
+pub use place::{check_file, check_folder, check_own};
 pub use plain::{key_of, plain};
 
 /// What to do with a file that is already there.

@@ -1,7 +1,8 @@
 //! Folders that hold results of another kind.
 
+use std::fs::{File, TryLockError};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::Error;
 
@@ -68,7 +69,7 @@ impl Owner {
     /// let folder = tempfile::tempdir()?;
     /// let [first, second] = ["a", "b"].map(|log| Owner { program: "diagnose", subject: format!("logs/{log}") });
     /// assert!(first.check(folder.path(), &["model.toml"]).is_ok());
-    /// first.claim(folder.path())?;
+    /// let claim = first.claim(folder.path())?;
     /// std::fs::write(folder.path().join("model.toml"), "")?;
     /// assert!(first.check(folder.path(), &["model.toml"]).is_ok());
     /// let error = second.check(folder.path(), &["model.toml"]).unwrap_err();
@@ -99,17 +100,59 @@ impl Owner {
         }
     }
 
-    /// Marks a folder, which must exist, before the first result is written: so a killed run leaves one that says whose it is.
+    /// Takes a folder, which must exist, before the first result is written. It is marked, so a killed run leaves one that says whose it is, and another program that
+    /// would write there is refused until the claim is dropped. A file system without locks refuses none.
     ///
     /// # Errors
     ///
-    /// [`Error`] where it cannot be written.
-    pub fn claim(&self, folder: &Path) -> Result<(), Error> {
-        crate::write(&folder.join(Self::FILE), self.text().as_bytes(), crate::Existing::Replace).map(drop)
+    /// [`Error`] where it cannot be written, and where another program holds it or was faster.
+    pub fn claim(&self, folder: &Path) -> Result<Claim, Error> {
+        let mark = folder.join(Self::FILE);
+        let made = crate::write(&mark, self.text().as_bytes(), crate::Existing::Keep)?;
+        let taken = |reason: &str| {
+            let reason = format!("{reason}: choose another folder, or wait");
+            Error::at("use", folder)(io::Error::new(io::ErrorKind::AlreadyExists, reason))
+        };
+        // For writing, as network file systems lock no others. Nothing is written to it.
+        let file = File::options().read(true).write(true).open(&mark).map_err(Error::at("open", &mark))?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(taken("another program is writing into it")),
+            Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(error)) => return Err(Error::at("lock", &mark)(error)),
+        }
+        let claim = Claim { folder: folder.to_path_buf(), made, _file: file };
+        // Whoever was faster may have taken it for something else.
+        self.check(folder, &[])?;
+        Ok(claim)
     }
 
     fn text(&self) -> String {
         format!("{}\n{}\n", self.program, crate::one_line(&self.subject, 4000))
+    }
+}
+
+/// A folder that nobody else writes results into; the operating system lets go of it when the program ends, however it ends.
+#[derive(Debug)]
+pub struct Claim {
+    folder: PathBuf,
+    /// Whether the folder was nobody's before.
+    made: bool,
+    _file: File,
+}
+
+impl Claim {
+    /// The folder.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Gives it back without results.
+    pub fn give_up(self) {
+        if self.made {
+            drop(std::fs::remove_file(self.folder.join(Owner::FILE)));
+        }
     }
 }
 
@@ -123,6 +166,27 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_folder_is_one_programs_at_a_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let [demo, diagnose] = ["demo", "diagnose"].map(|program| Owner { program, subject: String::new() });
+        let first = demo.claim(folder.path()).unwrap();
+        for second in [&demo, &diagnose] {
+            let message = second.claim(folder.path()).unwrap_err().source.to_string();
+            assert_eq!(message, "another program is writing into it: choose another folder, or wait");
+        }
+        drop(first);
+        drop(demo.claim(folder.path()).unwrap());
+        let message = diagnose.claim(folder.path()).unwrap_err().source.to_string();
+        assert_eq!(message, "it holds results of demo: choose another folder");
+        // One that was taken for nothing is nobody's again; results keep theirs.
+        demo.claim(folder.path()).unwrap().give_up();
+        demo.check(folder.path(), &[]).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        demo.claim(folder.path()).unwrap().give_up();
+        drop(diagnose.claim(folder.path()).unwrap());
+    }
+
+    #[test]
     fn files_of_others_keep_a_folder_from_being_taken() {
         let folder = tempfile::tempdir().unwrap();
         let owner = Owner { program: "demo", subject: String::new() };
@@ -131,7 +195,7 @@ mod tests {
         std::fs::write(folder.path().join("episode.html"), "mine").unwrap();
         let message = owner.check(folder.path(), &["episode.html"]).unwrap_err().source.to_string();
         assert_eq!(message, "it holds episode.html, which demo did not write: choose another folder");
-        owner.claim(folder.path()).unwrap();
+        drop(owner.claim(folder.path()).unwrap());
         owner.check(folder.path(), &["episode.html"]).unwrap();
         let other = Owner { program: "diagnose", subject: "a".into() };
         let message = other.check(folder.path(), &["model.toml"]).unwrap_err().source.to_string();

@@ -71,6 +71,30 @@ pub fn check_file(file: &Path) -> Result<(), Error> {
     }
 }
 
+/// Refuses a file for a result where another program's is: what is there has to be such a result, as `is_own` says of its text.
+///
+/// # Errors
+///
+/// [`Error`] that names `what` is written there, and as [`check_file`].
+///
+/// ```
+/// let folder = tempfile::tempdir()?;
+/// let file = folder.path().join("table.md");
+/// let check = || whole_file::check_own(&file, "a table", |text| text.starts_with("| engine"));
+/// check()?;
+/// std::fs::write(&file, "my notes")?;
+/// assert_eq!(check().unwrap_err().source.to_string(), "it is there, and is not a table of this program: choose another file");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn check_own(file: &Path, what: &str, is_own: impl FnOnce(&str) -> bool) -> Result<(), Error> {
+    check_file(file)?;
+    if !file.exists() || std::fs::read_to_string(file).is_ok_and(|text| is_own(&text)) {
+        return Ok(());
+    }
+    let reason = format!("it is there, and is not {what} of this program: choose another file");
+    Err(Error::at("replace", file)(io::Error::new(ErrorKind::AlreadyExists, reason)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

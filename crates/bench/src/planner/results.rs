@@ -30,6 +30,13 @@ impl Results {
     /// Where the folder cannot be made.
     pub fn open(folder: &Path, commit: String) -> Result<Self> {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        // A table is never without the numbers that it is of.
+        let [numbers, table] = ["json", "md"].map(|extension| folder.join(NAME).with_extension(extension));
+        ensure!(
+            numbers.exists() || !table.exists(),
+            "{}: exists without {NAME}.json beside it: choose another folder",
+            table.display()
+        );
         Ok(Self { folder: folder.to_path_buf(), commit })
     }
 

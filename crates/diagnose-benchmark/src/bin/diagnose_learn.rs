@@ -4,13 +4,12 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use clap::Parser;
 use diagnose_benchmark::example::{Example, read};
 use diagnose_benchmark::judge::{Judged, judge, judge_withheld};
 use diagnose_benchmark::learn::{Judgement, learn, leave_one_engine_out};
 use discrepancy::decision::Decision;
-use program::Failed;
 use serde::Serialize;
 use statistics::wilson95;
 use whole_file::Existing;
@@ -60,6 +59,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    check_places(arguments)?;
     let mut examples: Vec<Example> = Vec::new();
     for folder in &arguments.logs {
         examples.extend(read(folder, &arguments.answers)?);
@@ -92,17 +92,39 @@ fn run(arguments: &Arguments) -> Result<()> {
     let table = Table { provenance: provenance.clone(), engines: rows, withheld: judge_withheld(&withheld) };
     let text = markdown(&table);
     program::out!("{text}");
-    if let Some(folder) = &arguments.table {
-        std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+    if let Some(files) = tables(arguments) {
+        let folder = arguments.table.iter();
+        folder.map(|folder| std::fs::create_dir_all(folder)).collect::<Result<(), _>>().map_err(program::failed)?;
         let json = serde_json::to_string_pretty(&table)? + "\n";
-        let name = if arguments.unseen.is_some() { "unseen" } else { "worlds" };
-        for (extension, text) in [("md", &text), ("json", &json)] {
-            write(&folder.join(name).with_extension(extension), text)?;
+        for (file, text) in files.iter().zip([&text, &json]) {
+            write(file, text)?;
         }
     }
     if let Some(out) = &arguments.out {
         let all: Vec<&Example> = examples.iter().collect();
         write(out, &(serde_json::to_string_pretty(&learn(&all, earlier.as_ref(), provenance))? + "\n"))?;
+    }
+    Ok(())
+}
+
+/// The files of the table: text and numbers.
+fn tables(arguments: &Arguments) -> Option<[PathBuf; 2]> {
+    let name = if arguments.unseen.is_some() { "unseen" } else { "worlds" };
+    let folder = arguments.table.as_ref()?;
+    Some(["md", "json"].map(|extension| folder.join(name).with_extension(extension)))
+}
+
+/// Refuses places that hold something else, before anything is worked out.
+fn check_places(arguments: &Arguments) -> Result<()> {
+    if let (Some(folder), Some([text, numbers])) = (&arguments.table, tables(arguments)) {
+        whole_file::check_folder(folder)?;
+        if folder.exists() {
+            whole_file::check_own(&text, "a table", |text| text.starts_with("| engine |"))?;
+            whole_file::check_own(&numbers, "a table", |text| text.starts_with("{\n  \"provenance\""))?;
+        }
+    }
+    if let Some(out) = &arguments.out {
+        whole_file::check_own(out, "a decision", |text| serde_json::from_str::<Decision>(text).is_ok())?;
     }
     Ok(())
 }
@@ -146,8 +168,7 @@ fn unseen<'a>(path: &std::path::Path, examples: &'a [Example]) -> Result<Vec<Jud
 }
 
 fn write(path: &std::path::Path, text: &str) -> Result<()> {
-    let written = whole_file::write(path, text.as_bytes(), Existing::Replace);
-    written.map(|_| ()).map_err(|error| Failed(format!("{error}: {}", error.source).into()).into())
+    whole_file::write(path, text.as_bytes(), Existing::Replace).map(drop).map_err(program::failed)
 }
 
 /// The key of a provenance with that of the decision that another one began from.

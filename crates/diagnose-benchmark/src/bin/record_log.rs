@@ -10,7 +10,7 @@ use diagnose_benchmark::rehearsal::record;
 use discrepancy::ModelFile;
 use measured_log::{Episode, Format, Notes};
 use pomdp::Seed;
-use program::{Failed, typed};
+use program::typed;
 use scenario::{Problem, Selection};
 use whole_file::Existing;
 
@@ -67,12 +67,11 @@ fn run(arguments: &Arguments) -> Result<()> {
     let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
     match measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new()) {
         Err(taken @ measured_log::Error::Exists { .. }) => return Err(taken.into()),
-        Err(error) => return Err(Failed(error.to_string().into()).into()),
+        Err(error) => return Err(program::failed(error)),
         Ok(()) => {}
     }
     let model = ModelFile::of_effects(problem.scenario.effects.model.clone()).to_toml()?;
-    whole_file::write(&model_file, model.as_bytes(), Existing::Replace)
-        .map_err(|error| Failed(format!("{error}: {}", error.source).into()))?;
+    whole_file::write(&model_file, model.as_bytes(), Existing::Replace).map_err(program::failed)?;
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
     program::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
     let (folder, model) = (typed(&arguments.out), typed(&model_file));

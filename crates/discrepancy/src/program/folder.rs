@@ -35,7 +35,7 @@ mod tests {
             let folder = default(&runs, log, &owner, &files);
             owner.check(&folder, &files).unwrap();
             std::fs::create_dir_all(&folder).unwrap();
-            owner.claim(&folder).unwrap();
+            drop(owner.claim(&folder).unwrap());
             std::fs::write(folder.join("report.json"), "{}").unwrap();
             folder
         };

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use arm_diagnosis::{Diagnosis, Log, Report, Settings, diagnose, model_toml, model_urdf, page};
 use discrepancy::Error;
-use discrepancy::answer::{check_place, make_place, owner};
+use discrepancy::answer::{Place, check_place, owner};
 use program::typed;
 use whole_file::Existing;
 
@@ -31,8 +31,7 @@ pub(crate) fn run(measured: &Path, out: Option<&PathBuf>, seed: u64, json: bool)
     let text = report.json().map_err(|error| Error::Model { reason: error.to_string() })?;
     let name = measured.display().to_string();
     let files = files(&log, measured, &diagnosis, &page(&name, &report), &text)?;
-    let made = make_place(&out)?;
-    owner.claim(&out).inspect_err(|_| made.iter().for_each(|path| drop(std::fs::remove_dir(path))))?;
+    let _place = Place::make(&out, &owner)?;
     if files.iter().all(|(file, _)| *file != FILES[0]) {
         // One of an earlier answer would pass for this one's.
         drop(std::fs::remove_file(out.join(FILES[0])));

@@ -19,6 +19,7 @@ use push_task::{Action, Coordinates, Observation, Particle};
 use rayon::prelude::*;
 use scenario::{Problem, Scenario, Selection};
 use serde_json::{Value, json};
+use whole_file::Owner;
 
 /// Writes a dataset as arrays of starts and steps, for training/posterior.py.
 #[derive(Debug, Parser)]
@@ -54,6 +55,9 @@ Examples:
 /// What went wrong after the input was found to be good.
 const FAILED: Failed = Failed::new("the arrays were not written");
 
+/// What is written, with what it is last.
+const FILES: [&str; 2] = ["starts.f32", "starts.json"];
+
 fn main() -> ExitCode {
     program::finish(run(&program::parse()))
 }
@@ -78,6 +82,8 @@ fn run(arguments: &Arguments) -> Result<()> {
     let mobility = mobility(&scenario)?;
     let problem = Problem::assemble(&scenario.with_mobility(mobility), &root)?;
     whole_file::check_owner(&arguments.out, "starts.json")?;
+    let owner = Owner { program: "posterior-data", subject: String::new() };
+    owner.check(&arguments.out, &FILES)?;
 
     let (mut values, mut episodes, mut steps) = (Vec::new(), 0_u64, None);
     for shard in 0..reader.manifest().shards.len() {
@@ -94,9 +100,12 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     let about = about(&problem, mobility, &reader, episodes, steps.unwrap_or(0));
-    write_atomically(&arguments.out.join("starts.f32"), &values).context(FAILED)?;
+    std::fs::create_dir_all(&arguments.out).context(FAILED)?;
+    let _claim = owner.claim(&arguments.out).context(FAILED)?;
     let text = serde_json::to_string_pretty(&about).context(FAILED)?;
-    write_atomically(&arguments.out.join("starts.json"), text.as_bytes()).context(FAILED)?;
+    for (file, bytes) in FILES.into_iter().zip([values.as_slice(), text.as_bytes()]) {
+        write_atomically(&arguments.out.join(file), bytes).context(FAILED)?;
+    }
     let left_out = reader.manifest().episodes - episodes;
     program::out!("{}: {episodes} episodes, {left_out} that diverged are left out", typed(&arguments.out));
     Ok(())

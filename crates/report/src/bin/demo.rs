@@ -1,5 +1,6 @@
 //! `cargo xtask demo`: one episode to look at.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -107,8 +108,12 @@ fn run(arguments: &Arguments) -> Result<()> {
     whole_file::check_owner(&out, "trace.json").and_then(|()| owner.check(&out, &FILES)).map_err(|e| taken(&e))?;
     std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
     let game = Game { arguments, scenario: &scenario, problem: &problem, method, prior: prior.as_ref() };
+    // Held until the end: another program that would write there is refused before it plays.
+    let _claim = owner.claim(&out).map_err(|e| match e.source.kind() {
+        ErrorKind::AlreadyExists => taken(&e),
+        _ => anyhow::Error::from(e).context(FAILED),
+    })?;
     let (record, trace) = game.play(scenario::commit(&root)).context(FAILED)?;
-    owner.claim(&out).context(FAILED)?;
     write(&trace, &out).context(FAILED)?;
     if arguments.json {
         program::print(&format!("{}\n", serde_json::to_string(&record)?)).context(FAILED)?;
@@ -144,6 +149,9 @@ fn suggest_next(arguments: &Arguments, out: &Path) {
         if value != usual {
             eval.extend([option.to_string(), value.clone()]);
         }
+    }
+    if let Some(method) = arguments.method {
+        eval.extend(["--methods".into(), method.name().into()]);
     }
     if let Some(prior) = &arguments.prior {
         eval.extend(["--prior".into(), typed(prior)]);

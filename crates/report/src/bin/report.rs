@@ -7,7 +7,6 @@ use anyhow::{Result, anyhow};
 use clap::Parser;
 use experiments::Archive;
 use page::may_be_replaced;
-use program::Failed;
 use report::{Error, Suite, episode_figure, episode_page, run_page, suite_page};
 
 /// Makes a self-contained HTML page of a run of `eval`, of all tables of `eval --all`, or of an episode of `demo`.
@@ -52,8 +51,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         }
         suite_page(&suite)
     };
-    whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace)
-        .map_err(|error| Failed(format!("{error}: {}", error.source).into()))?;
+    whole_file::write(&out, page.as_bytes(), whole_file::Existing::Replace).map_err(program::failed)?;
     program::say!("written to {}: open it in a browser", program::typed(&out));
     Ok(())
 }

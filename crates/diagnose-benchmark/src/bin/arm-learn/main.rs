@@ -66,6 +66,10 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
+    whole_file::check_own(&arguments.table, "a table", |text| text.starts_with("| logs |"))?;
+    if let Some(out) = &arguments.out {
+        whole_file::check_own(out, "a decision", |text| serde_json::from_str::<Decision>(text).is_ok())?;
+    }
     let cases = answered(arguments)?;
     let text = match &arguments.unseen {
         Some(path) => {
@@ -91,11 +95,8 @@ fn run(arguments: &Arguments) -> Result<()> {
                 cases.iter().map(|case| (case, &others[case.truth.engine.as_str()])).collect();
             if let Some(out) = &arguments.out {
                 let decision = learn(cases.iter(), arguments.sets.iter().map(|set| set_name(set)).collect());
-                whole_file::write(
-                    out,
-                    (serde_json::to_string_pretty(&decision)? + "\n").as_bytes(),
-                    Existing::Replace,
-                )?;
+                let text = serde_json::to_string_pretty(&decision)? + "\n";
+                whole_file::write(out, text.as_bytes(), Existing::Replace)?;
             }
             table(&judged)
         }
