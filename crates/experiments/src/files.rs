@@ -69,11 +69,14 @@ pub(crate) fn check_identity<T: Serialize>(file: &Path, text: &str, expected: &T
     for (key, value) in expected.as_object().expect("a struct is an object") {
         let other = found.get(key).unwrap_or(&Value::Null);
         if other != value {
+            // Which network a run plays with.
+            let none = if key == "prior_hash" { "that of no network" } else { "missing" };
+            let words = |value: &Value| if value.is_null() { none.to_owned() } else { value.to_string() };
             return Err(Error::OtherRun {
                 file: file.to_path_buf(),
                 key: key.clone(),
-                found: if other.is_null() { "missing".into() } else { other.to_string() },
-                expected: value.to_string(),
+                found: words(other),
+                expected: words(value),
             });
         }
     }

@@ -178,7 +178,12 @@ fn write(target: &Target, log: &Log, notes: &Notes) -> Result<(), Error> {
     for line in import_log::summary(log) {
         program::out!("  {line}");
     }
-    let words = ["cargo", "xtask", "diagnose", "--measured", &program::typed(&target.out)];
-    program::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the nominal model lacks")]);
+    let folder = program::typed(&target.out);
+    let check = ["cargo", "xtask", "log", "check", &folder].map(String::from).to_vec();
+    let diagnose = ["cargo", "xtask", "diagnose", "--measured", &folder].map(String::from).to_vec();
+    program::next(&[
+        (check, "looks for wrong units, frames, signs and clocks"),
+        (diagnose, "finds what the log shows and the nominal model lacks"),
+    ]);
     Ok(())
 }

@@ -142,7 +142,10 @@ fn suggest_next(check: &Check) {
     chosen.extend(check.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
     let command = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
     let model = check.model.iter().flat_map(|path| ["--model".to_string(), typed(path)]);
-    let oracle = ["--methods".to_string(), "oracle,heuristic".to_string()];
+    // Apart from what a network plays of it, which is another run.
+    let out =
+        format!("runs/eval/{}-oracle", check.domain.rsplit('/').next().unwrap_or_default().trim_end_matches(".toml"));
+    let oracle = ["--methods", "oracle,heuristic", "--out", &out].map(String::from);
     let eval = [command(&["cargo", "xtask", "eval"]), chosen.clone(), oracle.to_vec(), model.collect()].concat();
     let mut next = vec![(eval, "plays it with full knowledge, and without a plan: can it be solved?")];
     if check.model.is_none() {
