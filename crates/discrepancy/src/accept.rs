@@ -144,7 +144,7 @@ mod tests {
     /// Two held-out episodes with residuals of this size.
     fn left_of(size: f64) -> Heldout {
         let square = 20.0 * size * size;
-        Heldout { squares: vec![square; 2], costs: vec![cell_cost(square, 20); 2] }
+        Heldout { squares: vec![square; 2], costs: vec![cell_cost(square, 20); 2], raw: Vec::new() }
     }
 
     /// A round that finds `found` beside `base` in what was fitted, and as much in two held-out episodes.

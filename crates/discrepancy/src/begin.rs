@@ -5,6 +5,7 @@ use physics_model::{EffectConfig, EffectKind};
 
 use crate::candidate::Candidate;
 use crate::fit::{Begin, Effort, Fit, cost, fit};
+use crate::likelihood::Stack;
 use crate::model::Model;
 use crate::screen::{Promise, Start};
 use crate::simulator::Hypothesis;
@@ -336,13 +337,20 @@ pub(crate) fn begin(part: &Study, base: &Fit, stated: Option<&Fit>, model: &Mode
     // Derivatives of what is nearer.
     let far = |from: &Fit| -> f64 { from.x.iter().zip(&x).take(model.tunables).map(|(a, b)| (a - b).powi(2)).sum() };
     let nearer = stated.filter(|stated| far(stated) < far(base)).unwrap_or(base);
-    let mut jacobian = nearer.jacobian.clone();
-    // A clock that gives way is not skewed, and changes nothing.
+    let jacobian = beside(part, nearer, &promise.candidate);
     for clock in part.simulator.nominal.replaced_by(promise.candidate.kind()) {
         x[clock] = 0.0;
-        jacobian[clock].iter_mut().for_each(|episode| episode.fill(0.0));
     }
     Begin { x, raw: Some(raw), jacobian }
+}
+
+/// Derivatives by the coordinates of a model beside a candidate: a clock that gives way to it is not skewed, and changes nothing.
+pub(crate) fn beside(study: &Study, base: &Fit, candidate: &Candidate) -> Vec<Stack> {
+    let mut jacobian = base.jacobian.clone();
+    for clock in study.simulator.nominal.replaced_by(candidate.kind()) {
+        jacobian[clock].iter_mut().for_each(|episode| episode.fill(0.0));
+    }
+    jacobian
 }
 
 /// Coordinates at which `other` does roughly what `found` does at its coordinates `a`, beside the nominal model re-tuned to `z`; `None` where it

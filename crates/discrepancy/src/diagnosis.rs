@@ -25,7 +25,7 @@ use crate::progress::Progress;
 use crate::replay::{replays, worst};
 use crate::report::Verdict;
 use crate::rival::Round;
-use crate::screen::{Screening, places};
+use crate::screen::{self, Screening, places};
 use crate::search::Search;
 use crate::separate::OPEN;
 use crate::simulator::{Hypothesis, Simulator};
@@ -41,10 +41,8 @@ use crate::verdict::{Decided, decide};
 /// A log of so many episodes may take the whole budget.
 const EPISODES: usize = 40;
 
-/// What the search leaves to the screening, in simulations of each of its episodes: about as many as the catalogue has strengths and places, and two thirds as many again for scans.
-const SCREENED: usize = 145;
-/// The same of what is thrown: fewer effects show.
-const SCREENED_THROWN: usize = 40;
+/// Simulations that are left for what comes after a search in pushes, of those that a toss may have for the search.
+const LOOKED_AT: usize = 360;
 /// Kinds of which the first of several effects of what is thrown is chosen: each further one costs what a further effect does.
 const QUICK_FITS_THROWN: usize = 4;
 
@@ -78,8 +76,7 @@ pub struct Settings {
     pub rollouts: usize,
     /// After this many fits end where they are.
     pub most: usize,
-    /// No fit of an effect begins a simulation that would end above this many. What is decided by, drawn and told of the last ones adds up to 160, and what each leaves of the worst
-    /// episodes is looked at in 280 more.
+    /// No fit of an effect begins a simulation that would end above this many. What is decided by, drawn and told of the last ones comes after it.
     pub limit: usize,
     /// Mean square of the residuals of an episode, on average over all but the worst, above which a second effect is looked for at once.
     pub unexplained: f64,
@@ -93,6 +90,12 @@ impl Settings {
     fn of_episodes(&self, episodes: usize) -> Self {
         let scaled = |count: usize| count.saturating_mul(episodes.max(EPISODES)) / EPISODES;
         Self { rollouts: scaled(self.rollouts), most: scaled(self.most), limit: scaled(self.limit), ..self.clone() }
+    }
+
+    /// For what is pushed: more rivals are left in the end, and what each leaves of many episodes is looked at.
+    fn pushed(&self) -> Self {
+        let less = |count: usize| count.saturating_sub(LOOKED_AT);
+        Self { rollouts: less(self.rollouts), most: less(self.most), limit: less(self.limit), ..self.clone() }
     }
 
     /// For what is thrown.
@@ -264,7 +267,7 @@ fn diagnose_among(
     let prepared = Prepared::new(&log, name, nominal, LEAST_FITTED)?;
     let Prepared { log, nominal, noise, units } = &prepared;
     let Compared { trials, fitted, choosing, reported, left_out } = Compared::new(log, name, nominal, noise, settings)?;
-    let settings = if nominal.has_tool() { settings.clone() } else { settings.thrown() };
+    let settings = if nominal.has_tool() { settings.pushed() } else { settings.thrown() };
     let settings = &settings.of_episodes(groups(trials.iter()).len());
     let simulator = Simulator::new(nominal, &trials).watched_by(progress, settings.limit);
     simulator.stage("re-tuning the nominal model");
@@ -279,8 +282,7 @@ fn diagnose_among(
     simulator.stage("screening the effects");
     let context = context(&study, &null, log, noise);
     // What was simulated so far depends on the log alone; what the screening takes, on the catalogue.
-    let screened = if nominal.has_tool() { SCREENED } else { SCREENED_THROWN };
-    let before = simulator.rollouts() + screened * part.rollouts();
+    let before = simulator.rollouts() + screen::cost(&part);
     let limits = [settings.rollouts, settings.most, settings.limit];
     let budget = Budget::new(limits.map(|limit| limit.saturating_sub(before)));
     let screening = Screening::new(&part, places, &null, stated, &catalogue(&context));

@@ -8,7 +8,7 @@ use crate::accept::Episodes;
 use crate::fit::Fit;
 use crate::gains::Gains;
 use crate::likelihood::{Stack, trimmed_mean};
-use crate::replay::{replays, worst};
+use crate::replay::{Replay, replays, worst};
 use crate::rival::{Rival, Round};
 use crate::search::Search;
 use crate::study::Study;
@@ -65,20 +65,19 @@ impl Findings {
             return Vec::new();
         }
         rivals.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-        let raw = search.kept.raw(&round.base.model.hypothesis(&round.base.x));
         let groups = worst(&search.study, &round.base);
-        let without = Leftover::new(&search.study, &groups, &round.base);
-        rivals.into_iter().map(|rival| Self::of(search, (round, &raw), (&groups, &without), rival, episodes)).collect()
+        let without = Leftover::new(&search.study, &round.base, &replays(&search.study, &groups, &round.base));
+        rivals.into_iter().map(|rival| Self::of(search, round, (&groups, &without), rival, episodes)).collect()
     }
 
     fn of(
         search: &Search,
-        (round, raw): (&Round, &Vec<Vec<f64>>),
+        round: &Round,
         (groups, left): (&[Range<usize>], &Leftover),
         rival: &Rival,
         episodes: &Episodes,
     ) -> Self {
-        let raws = [raw, &search.kept.raw(&rival.fit.model.hypothesis(&rival.fit.x))];
+        let raws = [&round.before.raw, &rival.heldout.raw];
         let white = |fit: &Fit, raw: &Vec<Vec<f64>>| search.kept.white(raw, fit.model.engine_errors(&fit.x));
         let [without, with] = [white(&round.base, raws[0]), white(&rival.fit, raws[1])];
         let trimmed = |stack: &Stack, of: &dyn Fn(Kind) -> bool| trimmed_errors(search, stack, episodes, of);
@@ -86,13 +85,18 @@ impl Findings {
         gains.add(&without, &with, &episodes.heldout);
         // Of one that was fitted to some episodes all are looked at as well.
         let base = &round.base.residuals;
-        if rival.whole {
+        let replayed = if rival.whole {
             gains.add(base, &rival.fit.residuals, &episodes.fitted);
+            replays(&search.study, groups, &rival.fit)
         } else {
-            let raw = search.study.raw(&rival.fit.model.hypothesis(&rival.fit.x));
+            let mut all = replays(&search.study, &episodes.fitted, &rival.fit);
+            let raw: Vec<Vec<f64>> = all.iter().flatten().map(Replay::residuals).collect();
             gains.add(base, &search.study.white(&raw, rival.fit.model.engine_errors(&rival.fit.x)), &episodes.fitted);
-        }
-        let left_with = Leftover::new(&search.study, groups, &rival.fit);
+            let mut fitted = episodes.fitted.iter();
+            all.retain(|_| fitted.next().is_some_and(|episode| groups.contains(episode)));
+            all
+        };
+        let left_with = Leftover::new(&search.study, &rival.fit, &replayed);
         Self {
             effect: rival.kind().name().into(),
             log_evidence: rival.gain,
@@ -123,16 +127,15 @@ struct Leftover {
 }
 
 impl Leftover {
-    fn new(study: &Study, groups: &[Range<usize>], fit: &Fit) -> Self {
-        let replays = replays(study, groups, fit);
-        let lacking = lacking_force(study.simulator, fit, &replays, &Units::default());
+    fn new(study: &Study, fit: &Fit, replays: &[Vec<Replay>]) -> Self {
+        let lacking = lacking_force(study.simulator, fit, replays, &Units::default());
         Self {
             // What is no number follows none.
             lawful: lacking
                 .map(|lacking| lacking.explained_share)
                 .filter(|share| *share > 0.0)
                 .map_or(0.0, |share| share.min(1.0)),
-            apart: contact_gap(&replays).map_or(0.0, |gap| gap.apart()),
+            apart: contact_gap(replays).map_or(0.0, |gap| gap.apart()),
         }
     }
 }
@@ -144,7 +147,7 @@ impl Findings {
         let white = search.kept.white(&raw, null.model.engine_errors(&null.x));
         let [motion, force] =
             [Kind::ObjectPosition, Kind::WristForce].map(|kind| [search.heldout_share(&raw, kind); 2]);
-        let left = Leftover::new(&search.study, &worst(&search.study, null), null);
+        let left = Leftover::new(&search.study, null, &replays(&search.study, &worst(&search.study, null), null));
         Self {
             effect: String::new(),
             log_evidence: 0.0,

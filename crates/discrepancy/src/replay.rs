@@ -21,6 +21,13 @@ pub(crate) struct Replay<'a> {
     pub(crate) readings: Vec<RigReading>,
 }
 
+impl Replay<'_> {
+    /// Standardised residuals.
+    pub(crate) fn residuals(&self) -> Vec<f64> {
+        self.trial.residuals(&self.start, &self.readings)
+    }
+}
+
 /// Places of the pieces of the episodes of a study that a fit to all of them explains worst, in their order.
 pub(crate) fn worst(study: &Study, fit: &Fit) -> Vec<Range<usize>> {
     let mut groups = study.groups();

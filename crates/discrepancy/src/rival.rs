@@ -12,6 +12,8 @@ pub struct Heldout {
     pub squares: Vec<f64>,
     /// −ln p, but for a constant.
     pub costs: Vec<f64>,
+    /// Residuals, standardised but not white.
+    pub(crate) raw: Vec<Vec<f64>>,
 }
 
 impl Heldout {

@@ -20,8 +20,8 @@ use crate::model::Model;
 use crate::simulator::Hypothesis;
 use crate::study::{Study, difference};
 
-/// Episodes that the screening looks at, at most.
-const EPISODES: usize = 10;
+/// Episodes that the screening looks at, at most. With more of them a search ends before it has compared its best models in all episodes.
+const EPISODES: usize = 8;
 /// The same of what is thrown, which lacks several effects: each toss meets the table more than once.
 const EPISODES_THROWN: usize = 8;
 /// An episode lasts long if it does so many times as long as the mean.
@@ -98,6 +98,16 @@ struct Point {
     clocks: Vec<f64>,
     own: Vec<f64>,
     change: Vec<Vec<f64>>,
+}
+
+/// What a screening of the whole catalogue takes in the episodes of `part`: one simulation of each for each strength and place, and scans of some. Of what is thrown
+/// fewer effects show.
+pub(crate) fn cost(part: &Study) -> usize {
+    if !part.simulator.nominal.has_tool() {
+        return 40 * part.rollouts();
+    }
+    let (episodes, scanned) = (part.groups().len(), part.groups().len().min(SCANNED));
+    87 * part.rollouts() + 145 * part.rollouts() * scanned / episodes.max(1)
 }
 
 impl Screening {

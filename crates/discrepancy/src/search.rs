@@ -6,6 +6,7 @@ use nalgebra::DVector;
 use physics_model::EffectKind;
 
 use crate::accept::{Asked, Episodes, better_heldout, both_convince, convinces, lasts, may_convince};
+use crate::begin::beside;
 use crate::candidate::Candidate;
 use crate::chain::{LEAST_SHARE, Link};
 use crate::diagnosis::Settings;
@@ -51,14 +52,9 @@ pub(crate) struct Search<'a> {
 impl Search<'_> {
     /// What a model leaves of the held-out episodes.
     pub(crate) fn heldout(&self, fit: &Fit) -> Heldout {
-        let white = self.heldout_residuals(fit);
-        Heldout { squares: white.iter().map(DVector::norm_squared).collect(), costs: white.costs() }
-    }
-
-    /// Residuals of the held-out episodes.
-    fn heldout_residuals(&self, fit: &Fit) -> Stack {
         let raw = self.kept.raw(&fit.model.hypothesis(&fit.x));
-        self.kept.white(&raw, fit.model.engine_errors(&fit.x))
+        let white = self.kept.white(&raw, fit.model.engine_errors(&fit.x));
+        Heldout { squares: white.iter().map(DVector::norm_squared).collect(), costs: white.costs(), raw }
     }
 
     /// Error of a kind in the held-out episodes, as a share of what it does there: root mean squares, both in its unit. 0 without such readings.
@@ -339,7 +335,14 @@ impl Search<'_> {
                     whole: false,
                 };
             }
-            let fit = fit(&self.study, quick.model, Begin::at(&quick.x), effort);
+            let begin = match quick.model.parts.last() {
+                // Derivatives of what the model was without the effect: steps mend them.
+                Some(candidate) if first => {
+                    Begin { x: quick.x, raw: None, jacobian: beside(&self.study, &base, candidate) }
+                }
+                _ => Begin::at(&quick.x),
+            };
+            let fit = fit(&self.study, quick.model, begin, effort);
             Rival {
                 heldout: self.heldout(&fit),
                 gain: fit.log_evidence() - without - self.finer_steps(&base, &fit),
