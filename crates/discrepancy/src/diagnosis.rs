@@ -444,7 +444,7 @@ mod tests {
     /// What a report says of a log whose candidates `catalogue` changes, but for what it cost.
     fn answer(log: &Log, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
         let nominal = Nominal::new(&log.header, crate::rig_tool(log, None).unwrap()).unwrap();
-        let short = Settings { rollouts: 2000, most: 2100, limit: 2300, ..Settings::default() };
+        let short = Settings { rollouts: 2800, most: 2900, limit: 3100, ..Settings::default() };
         let settings = Settings { looks: 6, quick_fits: 3, effects: 1, ..short };
         let made = |context: &Context| catalogue(candidates(context));
         let diagnosis = diagnose_among(log, "log", &nominal, &settings, &(), &made).unwrap();
@@ -468,6 +468,7 @@ mod tests {
             assert_eq!(found[key], plain[key], "{key}");
         }
         assert!(found["heldout"]["after"].as_f64() > plain["heldout"]["after"].as_f64());
+        assert_eq!(plain["findings"][0][0]["whole"], true, "nothing was compared");
         assert_eq!(plain["split"]["shared"], false);
     }
 

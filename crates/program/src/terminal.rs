@@ -36,11 +36,17 @@ pub fn complain(error: &dyn Display) {
     say(&format!("error: {}", one_line(&without_repeats(&without_codes(&format!("{error:#}"))), 4000)));
 }
 
-/// An error that says its cause, and has it as its cause, says it twice.
-fn without_repeats(text: &str) -> String {
-    let mut parts: Vec<&str> = text.split(": ").collect();
-    parts.dedup();
-    parts.join(": ")
+/// An error that says its cause, and has it as its cause, says it twice: `a: b: b`, or `a: b: a: b`.
+pub(crate) fn without_repeats(text: &str) -> String {
+    let mut said: Vec<&str> = Vec::new();
+    for part in text.split(": ") {
+        said.push(part);
+        let whole = said.len();
+        // The longest end that the words before it end with as well.
+        let twice = (1..=whole / 2).rev().find(|n| said[whole - n..] == said[whole - 2 * n..whole - n]);
+        said.truncate(whole - twice.unwrap_or(0));
+    }
+    said.join(": ")
 }
 
 /// Without the numbers that the operating system's words end with, ` (os error 2)`, which say nothing more.
@@ -75,6 +81,7 @@ mod tests {
     #[test]
     fn a_cause_is_said_once() {
         assert_eq!(without_repeats("cannot read a: no such file: no such file"), "cannot read a: no such file");
+        assert_eq!(without_repeats("cannot read a: no file: cannot read a: no file"), "cannot read a: no file");
         assert_eq!(without_repeats("a: b: a"), "a: b: a");
     }
 

@@ -143,8 +143,9 @@ fn suggest_next(check: &Check) {
     let command = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
     let model = check.model.iter().flat_map(|path| ["--model".to_string(), typed(path)]);
     // Apart from what a network plays of it, which is another run.
-    let out =
-        format!("runs/eval/{}-oracle", check.domain.rsplit('/').next().unwrap_or_default().trim_end_matches(".toml"));
+    let stem = |name: &str| std::path::Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let runs = if check.quick { "runs/quick/eval" } else { "runs/eval" };
+    let out = format!("{runs}/{}-{}-{}-oracle", stem(&check.domain), stem(&check.robot), stem(&check.preset));
     let oracle = ["--methods", "oracle,heuristic", "--out", &out].map(String::from);
     let eval = [command(&["cargo", "xtask", "eval"]), chosen.clone(), oracle.to_vec(), model.collect()].concat();
     let mut next = vec![(eval, "plays it with full knowledge, and without a plan: can it be solved?")];

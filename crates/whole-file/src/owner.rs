@@ -1,7 +1,7 @@
 //! Folders that hold results of another kind.
 
 use std::fs::{File, TryLockError};
-use std::io;
+use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::Error;
@@ -87,6 +87,8 @@ impl Owner {
         }
         match std::fs::read_to_string(folder.join(Self::FILE)) {
             Ok(text) if text == self.text() => Ok(()),
+            // What was killed, or given up, before it wrote anything owns nothing.
+            Ok(_) if holds_no_more(folder) => Ok(()),
             Ok(text) => {
                 let mut lines = text.lines();
                 let (program, subject) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
@@ -108,23 +110,30 @@ impl Owner {
     /// [`Error`] where it cannot be written, and where another program holds it or was faster.
     pub fn claim(&self, folder: &Path) -> Result<Claim, Error> {
         let mark = folder.join(Self::FILE);
-        let made = crate::write(&mark, self.text().as_bytes(), crate::Existing::Keep)?;
-        let taken = |reason: &str| {
-            let reason = format!("{reason}: choose another folder, or wait");
-            Error::at("use", folder)(io::Error::new(io::ErrorKind::AlreadyExists, reason))
-        };
-        // For writing, as network file systems lock no others. Nothing is written to it.
-        let file = File::options().read(true).write(true).open(&mark).map_err(Error::at("open", &mark))?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(taken("another program is writing into it")),
-            Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
-            Err(TryLockError::Error(error)) => return Err(Error::at("lock", &mark)(error)),
+        // Whoever gave the folder up has removed the mark, and a lock on that holds nothing.
+        for _ in 0..TRIES {
+            // For writing, as network file systems lock no others.
+            let opened = File::options().read(true).write(true).create(true).truncate(false).open(&mark);
+            let mut file = opened.map_err(Error::at("open", &mark))?;
+            if let Err(TryLockError::WouldBlock) = file.try_lock() {
+                let reason = "another program is writing into it: choose another folder, or wait";
+                return Err(Error::at("use", folder)(io::Error::new(io::ErrorKind::AlreadyExists, reason)));
+            }
+            if !is_at(&file, &mark) {
+                continue;
+            }
+            // Whoever was faster may have taken it for something else.
+            self.check(folder, &[])?;
+            let mut found = String::new();
+            let own = file.read_to_string(&mut found).is_ok_and(|_| found == self.text());
+            if !own {
+                let written =
+                    file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(self.text().as_bytes()));
+                written.map_err(Error::at("write", &mark))?;
+            }
+            return Ok(Claim { folder: folder.to_path_buf(), made: !own, _file: file });
         }
-        let claim = Claim { folder: folder.to_path_buf(), made, _file: file };
-        // Whoever was faster may have taken it for something else.
-        self.check(folder, &[])?;
-        Ok(claim)
+        Err(Error::at("use", folder)(io::Error::new(io::ErrorKind::AlreadyExists, "other programs come and go in it")))
     }
 
     fn text(&self) -> String {
@@ -156,6 +165,30 @@ impl Claim {
     }
 }
 
+/// Whether a folder holds the mark alone.
+fn holds_no_more(folder: &Path) -> bool {
+    let inside = std::fs::read_dir(folder).map(|inside| inside.flatten().map(|entry| entry.file_name()).collect());
+    inside.is_ok_and(|names: Vec<_>| names.iter().all(|name| name == Owner::FILE))
+}
+
+/// Whether an open file is still the one at a path.
+fn is_at(file: &File, path: &Path) -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt as _;
+        let id = |metadata: std::fs::Metadata| (metadata.dev(), metadata.ino());
+        matches!((file.metadata().map(id), std::fs::metadata(path).map(id)), (Ok(open), Ok(there)) if open == there)
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = file;
+        path.exists()
+    }
+}
+
+/// How often a folder is tried to be claimed that others give up meanwhile.
+const TRIES: usize = 20;
+
 /// Whether something that is no folder is there, a link to nothing among it.
 fn is_there(path: &Path) -> bool {
     std::fs::symlink_metadata(path).is_ok_and(|there| !there.is_dir())
@@ -176,14 +209,16 @@ mod tests {
         }
         drop(first);
         drop(demo.claim(folder.path()).unwrap());
-        let message = diagnose.claim(folder.path()).unwrap_err().source.to_string();
-        assert_eq!(message, "it holds results of demo: choose another folder");
-        // One that was taken for nothing is nobody's again; results keep theirs.
-        demo.claim(folder.path()).unwrap().give_up();
-        demo.check(folder.path(), &[]).unwrap();
+        // What left nothing but its mark owns nothing; results keep their owner, also when they are made anew in vain.
+        drop(diagnose.claim(folder.path()).unwrap());
+        std::fs::write(folder.path().join("report.json"), "{}").unwrap();
+        let message = demo.claim(folder.path()).unwrap_err().source.to_string();
+        assert_eq!(message, "it holds results of diagnose: choose another folder");
+        diagnose.claim(folder.path()).unwrap().give_up();
+        diagnose.check(folder.path(), &["report.json"]).unwrap();
         let folder = tempfile::tempdir().unwrap();
         demo.claim(folder.path()).unwrap().give_up();
-        drop(diagnose.claim(folder.path()).unwrap());
+        assert!(!folder.path().join(Owner::FILE).exists());
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Result, bail};
+use anyhow::{Context as _, Result, bail};
 use clap::Parser;
 use diagnose_benchmark::example::{Example, read};
 use diagnose_benchmark::judge::{Judged, judge, judge_withheld};
@@ -93,8 +93,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     let text = markdown(&table);
     program::out!("{text}");
     if let Some(files) = tables(arguments) {
-        let folder = arguments.table.iter();
-        folder.map(|folder| std::fs::create_dir_all(folder)).collect::<Result<(), _>>().map_err(program::failed)?;
+        if let Some(folder) = &arguments.table {
+            std::fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        }
         let json = serde_json::to_string_pretty(&table)? + "\n";
         for (file, text) in files.iter().zip([&text, &json]) {
             write(file, text)?;

@@ -19,7 +19,6 @@ use push_task::{Action, Coordinates, Observation, Particle};
 use rayon::prelude::*;
 use scenario::{Problem, Scenario, Selection};
 use serde_json::{Value, json};
-use whole_file::Owner;
 
 /// Writes a dataset as arrays of starts and steps, for training/posterior.py.
 #[derive(Debug, Parser)]
@@ -82,8 +81,16 @@ fn run(arguments: &Arguments) -> Result<()> {
     let mobility = mobility(&scenario)?;
     let problem = Problem::assemble(&scenario.with_mobility(mobility), &root)?;
     whole_file::check_owner(&arguments.out, "starts.json")?;
-    let owner = Owner { program: "posterior-data", subject: String::new() };
-    owner.check(&arguments.out, &FILES)?;
+    let [values_file, about_file] = FILES.map(|file| arguments.out.join(file));
+    if arguments.out.exists() {
+        whole_file::check_own(&about_file, "a description", |text| text.contains("\"step_values\""))?;
+        ensure!(
+            about_file.exists() || !values_file.exists(),
+            "{}: exists without {} beside it: choose another --out",
+            values_file.display(),
+            FILES[1]
+        );
+    }
 
     let (mut values, mut episodes, mut steps) = (Vec::new(), 0_u64, None);
     for shard in 0..reader.manifest().shards.len() {
@@ -101,10 +108,9 @@ fn run(arguments: &Arguments) -> Result<()> {
     }
     let about = about(&problem, mobility, &reader, episodes, steps.unwrap_or(0));
     std::fs::create_dir_all(&arguments.out).context(FAILED)?;
-    let _claim = owner.claim(&arguments.out).context(FAILED)?;
     let text = serde_json::to_string_pretty(&about).context(FAILED)?;
-    for (file, bytes) in FILES.into_iter().zip([values.as_slice(), text.as_bytes()]) {
-        write_atomically(&arguments.out.join(file), bytes).context(FAILED)?;
+    for (file, bytes) in [(&values_file, values.as_slice()), (&about_file, text.as_bytes())] {
+        write_atomically(file, bytes).context(FAILED)?;
     }
     let left_out = reader.manifest().episodes - episodes;
     program::out!("{}: {episodes} episodes, {left_out} that diverged are left out", typed(&arguments.out));

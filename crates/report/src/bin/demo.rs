@@ -109,11 +109,17 @@ fn run(arguments: &Arguments) -> Result<()> {
     std::fs::create_dir_all(&out).with_context(|| format!("cannot create {}", out.display()))?;
     let game = Game { arguments, scenario: &scenario, problem: &problem, method, prior: prior.as_ref() };
     // Held until the end: another program that would write there is refused before it plays.
-    let _claim = owner.claim(&out).map_err(|e| match e.source.kind() {
+    let claim = owner.claim(&out).map_err(|e| match e.source.kind() {
         ErrorKind::AlreadyExists => taken(&e),
         _ => anyhow::Error::from(e).context(FAILED),
     })?;
-    let (record, trace) = game.play(scenario::commit(&root)).context(FAILED)?;
+    let (record, trace) = match game.play(scenario::commit(&root)) {
+        Ok(played) => played,
+        Err(error) => {
+            claim.give_up();
+            return Err(error.context(FAILED));
+        }
+    };
     write(&trace, &out).context(FAILED)?;
     if arguments.json {
         program::print(&format!("{}\n", serde_json::to_string(&record)?)).context(FAILED)?;
@@ -122,6 +128,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         program::say!("written to {}: {}", typed(&out), FILES.join(", "));
         suggest_next(arguments, &out);
     }
+    drop(claim);
     Ok(())
 }
 
@@ -151,7 +158,9 @@ fn suggest_next(arguments: &Arguments, out: &Path) {
         }
     }
     if let Some(method) = arguments.method {
-        eval.extend(["--methods".into(), method.name().into()]);
+        let domain = Path::new(&arguments.domain).file_stem().unwrap_or_default().to_string_lossy();
+        let apart = format!("runs/eval/{domain}-{}", method.name());
+        eval.extend(["--methods".into(), method.name().into(), "--out".into(), apart]);
     }
     if let Some(prior) = &arguments.prior {
         eval.extend(["--prior".into(), typed(prior)]);
