@@ -344,8 +344,14 @@ pub(crate) fn begin(part: &Study, base: &Fit, stated: Option<&Fit>, model: &Mode
     Begin { x, raw: Some(raw), jacobian }
 }
 
+/// Where a fit to all episodes begins: at one to some of them, with the derivatives of what the model was without its last effect. Steps mend those.
+pub(crate) fn in_all(study: &Study, base: &Fit, some: &Fit) -> Begin {
+    let jacobian = some.model.parts.last().map_or_else(Vec::new, |candidate| beside(study, base, candidate));
+    Begin { x: some.x.clone(), raw: None, jacobian }
+}
+
 /// Derivatives by the coordinates of a model beside a candidate: a clock that gives way to it is not skewed, and changes nothing.
-pub(crate) fn beside(study: &Study, base: &Fit, candidate: &Candidate) -> Vec<Stack> {
+fn beside(study: &Study, base: &Fit, candidate: &Candidate) -> Vec<Stack> {
     let mut jacobian = base.jacobian.clone();
     for clock in study.simulator.nominal.replaced_by(candidate.kind()) {
         jacobian[clock].iter_mut().for_each(|episode| episode.fill(0.0));

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use physics_model::EffectKind;
 
 use crate::accept::{Asked, Episodes, better_heldout, both_convince, convinces, lasts, may_convince};
-use crate::begin::beside;
+use crate::begin::in_all;
 use crate::candidate::Candidate;
 use crate::chain::{LEAST_SHARE, Link};
 use crate::diagnosis::Settings;
@@ -335,13 +335,7 @@ impl Search<'_> {
                     whole: false,
                 };
             }
-            let begin = match quick.model.parts.last() {
-                // Derivatives of what the model was without the effect: steps mend them.
-                Some(candidate) if first => {
-                    Begin { x: quick.x, raw: None, jacobian: beside(&self.study, &base, candidate) }
-                }
-                _ => Begin::at(&quick.x),
-            };
+            let begin = if first { in_all(&self.study, &base, &quick) } else { Begin::at(&quick.x) };
             let fit = fit(&self.study, quick.model, begin, effort);
             Rival {
                 heldout: self.heldout(&fit),

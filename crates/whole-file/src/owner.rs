@@ -87,15 +87,14 @@ impl Owner {
         }
         match std::fs::read_to_string(folder.join(Self::FILE)) {
             Ok(text) if text == self.text() => Ok(()),
-            // What was killed, or given up, before it wrote anything owns nothing.
-            Ok(_) if holds_no_more(folder) => Ok(()),
-            Ok(text) => {
+            // What was killed, or given up, before it wrote anything owns nothing; an empty mark is one that is being written.
+            Ok(text) if !text.is_empty() && !holds_no_more(folder) => {
                 let mut lines = text.lines();
                 let (program, subject) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
                 let of = if subject.is_empty() { String::new() } else { format!(" for {subject}") };
                 refuse(crate::one_line(&format!("it holds results of {program}{of}"), 400))
             }
-            Err(_) => match files.iter().find(|file| is_there(&folder.join(file))) {
+            _ => match files.iter().find(|file| is_there(&folder.join(file))) {
                 Some(file) => refuse(format!("it holds {file}, which {} did not write", self.program)),
                 None => Ok(()),
             },
