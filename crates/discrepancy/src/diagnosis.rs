@@ -444,7 +444,7 @@ mod tests {
     /// What a report says of a log whose candidates `catalogue` changes, but for what it cost.
     fn answer(log: &Log, catalogue: impl Fn(Vec<Candidate>) -> Vec<Candidate>) -> serde_json::Value {
         let nominal = Nominal::new(&log.header, crate::rig_tool(log, None).unwrap()).unwrap();
-        let short = Settings { rollouts: 2500, most: 2600, limit: 2800, ..Settings::default() };
+        let short = Settings { rollouts: 2800, most: 2900, limit: 3100, ..Settings::default() };
         let settings = Settings { looks: 6, quick_fits: 3, effects: 1, ..short };
         let made = |context: &Context| catalogue(candidates(context));
         let diagnosis = diagnose_among(log, "log", &nominal, &settings, &(), &made).unwrap();
