@@ -128,7 +128,6 @@ fn run(arguments: &Arguments) -> Result<()> {
         program::say!("written to {}: {}", typed(&out), FILES.join(", "));
         suggest_next(arguments, &out);
     }
-    drop(claim);
     Ok(())
 }
 
