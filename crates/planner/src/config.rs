@@ -395,7 +395,7 @@ mod tests {
 
     #[test]
     fn a_config_survives_writing_and_reading() {
-        let early_stop = Some(EarlyStop { rounds: 4, gain: 2.5 });
+        let early_stop = Some(EarlyStop { rounds: 4, price: 2.5 });
         let other = Config { choice: Choice::MostVisits, branch_states: 7, early_stop, ..config() };
         for config in [config(), other] {
             assert_eq!(toml::from_str::<Config>(&toml::to_string(&config).unwrap()).unwrap(), config);
@@ -483,7 +483,7 @@ mod tests {
         assert_eq!(d().with_backup(Backup::Watkins), Config { backup: Backup::Watkins, ..d() });
         assert_eq!(d().with_choice(Choice::MostVisits), Config { choice: Choice::MostVisits, ..d() });
         assert_eq!(d().with_branch_states(9), Config { branch_states: 9, ..d() });
-        let early_stop = Some(EarlyStop { rounds: 6, gain: 3.0 });
+        let early_stop = Some(EarlyStop { rounds: 6, price: 3.0 });
         assert_eq!(d().with_early_stop(6, 3.0), Config { early_stop, ..d() });
         assert_eq!(d().with_nodes(50), Config { nodes: 50, ..d() });
         assert_eq!(d().with_trees(4, 2), Config { trees: 4, threads: 2, ..d() });

@@ -7,7 +7,7 @@ use pomdp::{Belief, Discretise, GenerativeModel, Policy, Rng};
 
 use crate::branching::{Branching, Export};
 use crate::export::{self, ExportLimit, TreeNode};
-use crate::gain::{Moments, open_gain};
+use crate::gain::{Contest, Moments};
 use crate::nodes::{NodeId, Slot};
 use crate::simulate::{Progress, Search, Share, Tally};
 use crate::tree::KeyTree;
@@ -57,7 +57,7 @@ pub enum Stop {
     Transitions,
     /// Time was up.
     Time,
-    /// Little was left to gain: [`crate::EarlyStop`].
+    /// More would not have paid: [`crate::EarlyStop`].
     LittleToGain,
 }
 
@@ -153,7 +153,7 @@ impl<M: GenerativeModel, T: Branching<M>> Planner<M, T> {
                     *root = Root::Known;
                 }
             });
-            enough = round + 1 < rounds && enough_is_known(config, &started);
+            enough = round + 1 < rounds && enough_is_known(config, &started, round + 1);
             if enough {
                 break;
             }
@@ -214,8 +214,12 @@ fn merged<'a>(roots: impl Iterator<Item = &'a [Slot]>) -> Vec<ActionStats> {
     stats
 }
 
-/// Whether the search may end here: [`crate::EarlyStop`].
-fn enough_is_known<M: GenerativeModel, T: Branching<M>>(config: &Config, trees: &[(&mut (T, Root), Progress)]) -> bool {
+/// Whether the search may end here, after so many rounds: [`crate::EarlyStop`].
+fn enough_is_known<M, T>(config: &Config, trees: &[(&mut (T, Root), Progress)], rounds_done: usize) -> bool
+where
+    M: GenerativeModel,
+    T: Branching<M>,
+{
     let Some(early) = config.early_stop else { return false };
     let roots = || trees.iter().map(|(entry, _)| entry.0.nodes().slots(NodeId::ROOT));
     let stats = merged(roots());
@@ -225,7 +229,8 @@ fn enough_is_known<M: GenerativeModel, T: Branching<M>>(config: &Config, trees: 
         returns.iter_mut().zip(&progress.returns).for_each(|(merged, own)| merged.merge(*own));
     }
     let legal: Vec<bool> = (0..stats.len()).map(|action| roots().any(|root| root[action].legal())).collect();
-    open_gain(&stats, &returns, &legal, best) <= early.gain
+    let simulations = trees.iter().map(|(_, progress)| progress.tally.simulations).sum();
+    early.is_enough(&Contest::new(&stats, &returns, &legal, best), simulations, rounds_done)
 }
 
 impl<M: GenerativeModel, T: Export> Planner<M, T> {

@@ -152,7 +152,7 @@ fn trees_share_the_budget_and_their_number_of_threads_changes_nothing() {
 #[test]
 fn a_search_ends_early_where_little_is_left_to_gain_and_spends_its_budget_where_actions_tie() {
     let run = |rewards, budget, threads| {
-        let config = Config { trees: 3, threads, ..config(budget, 3) }.with_early_stop(5, 1e-6);
+        let config = Config { trees: 3, threads, ..config(budget, 3) }.with_early_stop(5, 1e-9);
         let mut planner = Pomcp::new(config).unwrap();
         planner.search(&Noise::new(rewards), &START, &UniformPolicy, 3, &mut rng(0))
     };
