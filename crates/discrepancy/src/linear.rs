@@ -26,7 +26,7 @@ struct Cell {
     count: usize,
     chi2: f64,
     slope: Vec<f64>,
-    /// The lower triangle, row by row.
+    /// The lower triangle, column by column.
     gram: Vec<f64>,
 }
 
@@ -69,23 +69,29 @@ impl Linear {
         Self { cells, coordinates: n }
     }
 
-    /// −ln p after a step, but for a constant.
-    fn cost(&self, delta: &DVector<f64>) -> f64 {
-        self.cells.iter().map(|cell| cell_cost(cell.chi2_after(delta), cell.count)).sum()
+    /// χ² of each cell after a step, and −ln p of all, but for a constant.
+    fn after(&self, delta: &DVector<f64>) -> After {
+        let mut below = vec![0.0; self.coordinates];
+        let chi2: Vec<f64> = self.cells.iter().map(|cell| cell.chi2_after(delta, &mut below)).collect();
+        let cost = self.cells.iter().zip(&chi2).map(|(cell, chi2)| cell_cost(*chi2, cell.count)).sum();
+        After { chi2, cost }
     }
 
-    /// Weighted sums of `gram` and `slope`, with the weights of after a step.
-    fn weighted(&self, delta: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    /// Weighted sums of `gram` and `slope`, with the weights of these χ².
+    fn weighted(&self, chi2: &[f64]) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.coordinates;
-        let (mut gram, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        for cell in &self.cells {
-            let weight = cell_weight(cell.chi2_after(delta), cell.count);
-            let mut products = cell.gram.iter();
-            for i in 0..n {
-                slope[i] += weight * cell.slope[i];
-                for (j, product) in (0..=i).zip(&mut products) {
-                    gram[(i, j)] += weight * product;
-                }
+        let mut slope = DVector::zeros(n);
+        let mut packed = vec![0.0; n * (n + 1) / 2];
+        for (cell, chi2) in self.cells.iter().zip(chi2) {
+            let weight = cell_weight(*chi2, cell.count);
+            slope.iter_mut().zip(&cell.slope).for_each(|(sum, slope)| *sum += weight * slope);
+            packed.iter_mut().zip(&cell.gram).for_each(|(sum, product)| *sum += weight * product);
+        }
+        let mut gram = DMatrix::zeros(n, n);
+        let mut packed = packed.iter();
+        for j in 0..n {
+            for (i, sum) in (j..n).zip(&mut packed) {
+                gram[(i, j)] = *sum;
             }
         }
         gram.fill_upper_triangle_with_lower_triangle();
@@ -104,9 +110,9 @@ impl Linear {
             // By how much the weight falls, with half the χ².
             let bend = cell_bend(cell.chi2, cell.count);
             let mut products = cell.gram.iter();
-            for i in 0..n {
-                slope[i] += weight * cell.slope[i];
-                for (j, product) in (0..=i).zip(&mut products) {
+            for j in 0..n {
+                slope[j] += weight * cell.slope[j];
+                for (i, product) in (j..n).zip(&mut products) {
                     gram[(i, j)] += weight * product;
                     hessian[(i, j)] += weight * product - bend * cell.slope[i] * cell.slope[j];
                 }
@@ -124,19 +130,21 @@ impl Linear {
     pub(crate) fn minimum(&self, x: &[f64], range: impl Fn(usize) -> [f64; 2], damping: f64) -> Option<Minimum> {
         let prior = |delta: &DVector<f64>| 0.5 * x.iter().zip(delta.iter()).map(|(x, d)| (x + d).powi(2)).sum::<f64>();
         let mut delta = DVector::zeros(x.len());
-        let mut least = self.cost(&delta) + prior(&delta);
+        let After { mut chi2, cost } = self.after(&delta);
+        let mut least = cost + prior(&delta);
         if !least.is_finite() {
             return None;
         }
         let mut half_determinant = 0.0;
         for iteration in 0..ITERATIONS {
-            let (mut gram, mut slope) = self.weighted(&delta);
+            let (mut gram, mut slope) = self.weighted(&chi2);
             for (i, x) in x.iter().enumerate() {
                 gram[(i, i)] += 1.0;
                 slope[i] += x;
             }
             let (next, determinant) = bounded(x, &range, &gram, &slope, damping)?;
-            let cost = self.cost(&next) + prior(&next);
+            let after = self.after(&next);
+            let cost = after.cost + prior(&next);
             if iteration == 0 {
                 half_determinant = determinant;
             }
@@ -145,7 +153,7 @@ impl Linear {
                 break;
             }
             let gained = least - cost;
-            (delta, least, half_determinant) = (next, cost, determinant);
+            (delta, chi2, least, half_determinant) = (next, after.chi2, cost, determinant);
             if gained < LITTLE {
                 break;
             }
@@ -158,24 +166,35 @@ impl Cell {
     fn add(&mut self, residual: f64, row: &[f64]) {
         self.count += 1;
         self.chi2 += residual * residual;
-        let mut products = self.gram.iter_mut();
-        for (i, a) in row.iter().enumerate() {
-            self.slope[i] += a * residual;
-            row[..=i].iter().zip(&mut products).for_each(|(b, product)| *product += a * b);
+        self.slope.iter_mut().zip(row).for_each(|(slope, a)| *slope += a * residual);
+        let mut rest = self.gram.as_mut_slice();
+        for (j, a) in row.iter().enumerate() {
+            let column = rest.split_off_mut(..row.len() - j).unwrap_or_default();
+            column.iter_mut().zip(&row[j..]).for_each(|(product, b)| *product += a * b);
         }
     }
 
-    fn chi2_after(&self, delta: &DVector<f64>) -> f64 {
+    /// `below` is room for as many numbers as there are coordinates.
+    fn chi2_after(&self, delta: &DVector<f64>, below: &mut [f64]) -> f64 {
+        below.fill(0.0);
         let mut chi2 = self.chi2;
-        let mut products = self.gram.iter();
-        for (i, (d, slope)) in delta.iter().zip(&self.slope).enumerate() {
-            let below: f64 = delta.iter().take(i).zip(&mut products).map(|(d, product)| d * product).sum();
-            let own = products.next().copied().unwrap_or(0.0);
-            chi2 += d * (2.0 * (slope + below) + own * d);
+        let mut rest = self.gram.as_slice();
+        for (j, d) in delta.iter().enumerate() {
+            let column = rest.split_off(..delta.len() - j).unwrap_or_default();
+            let own = column.first().copied().unwrap_or(0.0);
+            chi2 += d * (2.0 * (self.slope[j] + below[j]) + own * d);
+            // What this coordinate adds to those behind it.
+            below[j..].iter_mut().zip(column).skip(1).for_each(|(sum, product)| *sum += d * product);
         }
         // Rounding may lead below 0; what is no number stays none.
         if chi2 < 0.0 { 0.0 } else { chi2 }
     }
+}
+
+/// What a step leads to.
+struct After {
+    chi2: Vec<f64>,
+    cost: f64,
 }
 
 /// The minimum of a quadratic form within the ranges, and half the ln determinant of its free part: coordinates that it would push over a border stay there.
@@ -291,7 +310,7 @@ mod tests {
         for (piece, found) in linear.by_piece(2).iter().enumerate() {
             let one = |stack: &Stack| Stack::from(vec![stack[piece].clone()]);
             let alone = Linear::new(&one(&residuals), &jacobian.each_ref().map(one).iter().collect::<Vec<_>>());
-            let at = |a: f64, b: f64| alone.cost(&DVector::from_vec(vec![a, b]));
+            let at = |a: f64, b: f64| alone.after(&DVector::from_vec(vec![a, b])).cost;
             let h = 1e-3;
             let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-3 * (1.0 + b.abs()), "{piece}: {a} {b}");
             close(found.slope[1], (at(0.0, h) - at(0.0, -h)) / (2.0 * h));
