@@ -56,7 +56,7 @@ impl Decoder {
         match self {
             Self::Cdr(schema) => cdr::decode(schema, bytes),
             Self::Ros1(schema) => cdr::decode_ros1(schema, bytes),
-            Self::Json => serde_json::from_slice(bytes).map_err(|e| e.to_string()),
+            Self::Json => serde_json::from_slice(bytes).map_err(|e| whole_file::plain(&e.to_string())),
             Self::Protobuf(kind) => {
                 let message = DynamicMessage::decode(kind.clone(), bytes).map_err(|e| e.to_string())?;
                 protobuf(&message, &mut 0)

@@ -103,7 +103,11 @@ impl Error {
 
     /// An [`Error::Broken`] with the words of a decoder.
     pub(crate) fn broken(path: &Path, format: &'static str, reason: &dyn std::fmt::Display) -> Self {
-        Self::Broken { path: path.to_owned(), format, reason: whole_file::one_line(&reason.to_string(), 300) }
+        Self::Broken {
+            path: path.to_owned(),
+            format,
+            reason: whole_file::one_line(&whole_file::plain(&reason.to_string()), 300),
+        }
     }
 
     /// Whether the disk refused what was to be written: no fault of the input.

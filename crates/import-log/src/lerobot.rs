@@ -44,8 +44,10 @@ pub(crate) struct Info {
 pub(crate) fn info(folder: &Path) -> Result<Info, Error> {
     let path = folder.join("meta/info.json");
     let text = read_text(&path, MAX_INFO)?;
-    let raw: RawInfo = serde_json::from_str(&text)
-        .map_err(|e| Error::Syntax { path: path.clone(), reason: whole_file::one_line(&e.to_string(), 200) })?;
+    let raw: RawInfo = serde_json::from_str(&text).map_err(|e| Error::Syntax {
+        path: path.clone(),
+        reason: whole_file::one_line(&whole_file::plain(&e.to_string()), 200),
+    })?;
     if !["v2", "v3"].iter().any(|known| raw.codebase_version.starts_with(known)) {
         let found = excerpt(&raw.codebase_version);
         return Err(Error::source(&path, "key codebase_version", "v2.0, v2.1 or v3.0", found));

@@ -138,7 +138,9 @@ impl<R: Read> Read for Unpacked<R> {
 impl<S: Sink> File<'_, S> {
     /// Reads the records of a chunk one by one. The reader of the crate would, but mcap 0.25 never ends on some damaged ones.
     fn chunk(&mut self, header: &ChunkHeader, data: &[u8]) -> Result<(), Error> {
-        let bad = |error: io::Error| broken(self.path, &format!("a chunk cannot be unpacked: {error}"));
+        let bad = |error: io::Error| {
+            broken(self.path, &format!("a chunk cannot be unpacked: {}", whole_file::plain(&error.to_string())))
+        };
         let inner: Box<dyn Read + '_> = match header.compression.as_str() {
             "" => Box::new(data),
             "zstd" => {
@@ -157,7 +159,7 @@ impl<S: Sink> File<'_, S> {
         let mut body = Vec::new();
         while bytes.count < header.uncompressed_size {
             let mut head = [0; 9];
-            bytes.read_exact(&mut head).map_err(|e| broken(self.path, &format!("a chunk cannot be unpacked: {e}")))?;
+            bytes.read_exact(&mut head).map_err(bad)?;
             let mut length = [0; 8];
             length.copy_from_slice(&head[1..]);
             let length = u64::from_le_bytes(length);
@@ -169,7 +171,7 @@ impl<S: Sink> File<'_, S> {
             }
             body.clear();
             let read = (&mut bytes).take(length).read_to_end(&mut body);
-            let count = read.map_err(|e| broken(self.path, &format!("a chunk cannot be unpacked: {e}")))?;
+            let count = read.map_err(bad)?;
             if count as u64 != length {
                 return Err(broken(self.path, &format!("a chunk ends within a record of {length} bytes")));
             }

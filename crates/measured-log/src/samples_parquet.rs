@@ -44,7 +44,7 @@ pub(crate) fn decode(bytes: Bytes, robot: Robot) -> Result<Vec<Episode>, Failure
 }
 
 fn decode_trusting(bytes: Bytes, robot: Robot) -> Result<Vec<Episode>, Failure> {
-    let unreadable = |e: ParquetError| Failure::Parquet(whole_file::one_line(&e.to_string(), 300));
+    let unreadable = |e: ParquetError| Failure::Parquet(whole_file::one_line(&whole_file::plain(&e.to_string()), 300));
     let builder = ParquetRecordBatchReaderBuilder::try_new(bytes).map_err(unreadable)?;
     let schema = builder.schema().clone();
     let names: Vec<&str> = schema.fields().iter().map(|field| field.name().as_str()).collect();

@@ -50,8 +50,26 @@ const FOUND: [(&str, &str); 13] = [
     ("enum", "a name or a table"),
 ];
 
+/// Kinds of an error that decoders put before what they say, the outer ones first.
+const KINDS: [&str; 12] = [
+    "custom: ",
+    "Custom: ",
+    "ParseIntError: ",
+    "ParseFloatError: ",
+    "ParseBoolError: ",
+    "Parquet argument error: ",
+    "External: ",
+    "Parquet error: ",
+    "Arrow: ",
+    "Parser error: ",
+    "EOF: ",
+    "General: ",
+];
+
 /// Sentences of decoders of JSON, TOML, XML and numbers that say nothing to who writes a file.
-const SENTENCES: [(&str, &str); 29] = [
+const SENTENCES: [(&str, &str); 31] = [
+    ("failed to fill whole buffer", "it ends too early"),
+    ("unexpected end of file", "it ends too early"),
     // A name where a table was: what is there, the decoder does not say.
     ("invalid type: unit variant, expected string only", "expected a name, or a table with one key"),
     ("wanted exactly 1 element, found 0 elements", "expected a table with one key, found an empty one"),
@@ -106,7 +124,7 @@ pub fn key_of(path: &str, message: &str) -> String {
     }
 }
 
-/// The message of a serde decoder (TOML, JSON or XML) as words: `invalid type: string "far", expected usize` becomes `expected a whole number, 0 or more, found the
+/// The message of a serde decoder (TOML, JSON, XML or Parquet) as words: `invalid type: string "far", expected usize` becomes `expected a whole number, 0 or more, found the
 /// text "far"`. What it does not know stays as it is.
 ///
 /// ```
@@ -118,12 +136,8 @@ pub fn key_of(path: &str, message: &str) -> String {
 #[must_use]
 pub fn plain(message: &str) -> String {
     let message = message.trim();
-    let message = ["custom: ", "Custom: "].iter().find_map(|start| message.strip_prefix(start)).unwrap_or(message);
-    // Decoders of XML begin with the kind of the error, or with the place.
-    let message = ["ParseIntError: ", "ParseFloatError: ", "ParseBoolError: "]
-        .iter()
-        .find_map(|start| message.strip_prefix(start))
-        .unwrap_or(message);
+    // Decoders of XML and Parquet begin with the kind of the error, those of XML also with the place.
+    let message = KINDS.iter().fold(message, |rest, kind| rest.strip_prefix(kind).unwrap_or(rest));
     if let Some((place, reason)) = message.strip_prefix("Parse error; ").and_then(|rest| rest.split_once(", Reason: "))
     {
         return format!("{}: {}", place.replace(':', "").to_lowercase(), plain(reason));
@@ -273,6 +287,8 @@ mod tests {
             ("Parse error; Line: 3, Column: 10, Reason: Malformed XML", "line 3, column 10: Malformed XML"),
             ("number too large to fit in target type", "expected a smaller whole number"),
             ("invalid type: integer `1`, expected enum Verdict", "expected a name, or a table with one key, found 1"),
+            ("Parquet error: EOF: file is 3 bytes long", "file is 3 bytes long"),
+            ("External: failed to fill whole buffer", "it ends too early"),
             ("what nobody knows", "what nobody knows"),
             ("", ""),
         ];
