@@ -178,7 +178,7 @@ Examples:
   cargo xtask bench accuracy";
 
 fn main() -> ExitCode {
-    program::finish(run(&Arguments::parse()))
+    program::finish(run(&program::parse()))
 }
 
 fn run(arguments: &Arguments) -> Result<()> {

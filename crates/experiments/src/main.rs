@@ -24,16 +24,16 @@ struct Arguments {
     #[arg(long, conflicts_with_all = ["domain", "robot", "preset", "methods", "world", "executor", "worker"])]
     all: bool,
     /// With --all: plays only these tables (table1), runs (table1-paper) or run directories (table1-paper-D3), separated by commas.
-    #[arg(long, value_delimiter = ',', requires = "all")]
+    #[arg(long, value_delimiter = ',', requires = "all", conflicts_with = "domain")]
     only: Vec<String>,
     /// With --all: Python with mujoco and numpy, for the runs in MuJoCo. Without these modules those runs are left out.
-    #[arg(long, default_value = "python3", requires = "all")]
+    #[arg(long, default_value = "python3", requires = "all", conflicts_with = "domain")]
     python: String,
     /// With --all: counts finished runs of another commit as they are, instead of refusing them; the tables name the commit of each.
-    #[arg(long, requires = "all")]
+    #[arg(long, requires = "all", conflicts_with = "domain")]
     keep_finished: bool,
     /// With --all: copies the combined tables and pictures to assets/results.
-    #[arg(long, requires = "all", conflicts_with = "quick")]
+    #[arg(long, requires = "all", conflicts_with_all = ["quick", "domain"])]
     publish: bool,
     /// Arm: sawyer, jaco, or a robot file (docs/src/guides/arm.md).
     #[arg(long, default_value = "sawyer")]

@@ -50,7 +50,7 @@ struct Arguments {
     /// Folder of the trained prior [default: the one trained here with the same --quick, else the shipped one].
     #[arg(long)]
     prior: Option<PathBuf>,
-    /// Folder of the results [default: runs/demo/DOMAIN-ROBOT-PRESET-METHOD, or runs/quick/demo/…].
+    /// Folder of the results [default: runs/demo/DOMAIN-ROBOT-PRESET-METHOD, with -seed-SEED-trial-TRIAL behind it for another world than the usual one; runs/quick/demo/… with --quick].
     #[arg(long)]
     out: Option<PathBuf>,
     /// Project folder [default: the nearest one above with scenarios/base.toml].
@@ -158,7 +158,8 @@ fn suggest_next(arguments: &Arguments, out: &Path) {
     }
     if let Some(method) = arguments.method {
         let domain = Path::new(&arguments.domain).file_stem().unwrap_or_default().to_string_lossy();
-        let apart = format!("runs/eval/{domain}-{}", method.name());
+        let runs = if arguments.quick { "runs/quick/eval" } else { "runs/eval" };
+        let apart = format!("{runs}/{domain}-{}", method.name());
         eval.extend(["--methods".into(), method.name().into(), "--out".into(), apart]);
     }
     if let Some(prior) = &arguments.prior {
