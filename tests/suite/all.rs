@@ -106,11 +106,14 @@ fn check_table(file: &Path) {
 fn what_all_cannot_mean_is_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let cases: [(&str, &[&str]); 5] = [
+    let cases: [(&str, &[&str]); 8] = [
         ("--all --only table9", &["table9", "table1-paper"]),
         ("--all --domain D4", &["--domain"]),
         ("--all --quick --publish", &["--publish", "--quick"]),
         ("--only table1", &["--all"]),
+        ("--domain D4 --only table1", &["--domain"]),
+        ("--domain D4 --python python3", &["--domain"]),
+        ("--domain D4 --publish", &["--domain"]),
         ("--all --set task.horizn=3", &["task.horizn", "horizon"]),
     ];
     for (arguments, parts) in cases {

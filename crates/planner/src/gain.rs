@@ -9,16 +9,18 @@ use crate::{ActionStats, Config, Error};
 /// decision, and ends where none adds more than it costs. `price` is that of the whole budget, a part costs its share.
 ///
 /// What m more simulations add is the largest expected improvement E[max(0, V(a) − V(best))] of another legal action, for the difference of the means that
-/// they would show. It is normal about that of today. Its variance is the squared standard error of the difference, times the share m / (N + m) that
-/// simulations as many as the N of the root take off: each mean then has m / N times as many returns more, and an error of variance σ² / n becomes one of
-/// σ² / (n (1 + m / N)). The standard error of a mean is the standard deviation of an action's returns at the root in this search over √N(ha);
-/// actions with few returns borrow from the spread of all. Counts N hold what was kept from earlier searches and initial visits, as the mean does.
+/// they would show. That is taken for normal about the difference of today. Its variance is the squared standard error of today less that of after m more. If
+/// those go to the actions as the N of this search so far, this is the share m / (N + m) of today's: an error of variance σ² / n becomes one of σ² / (n (1 + m / N)).
+/// The standard error of a mean is the standard deviation of an action's returns at the root in this search over √N(ha). Actions with few returns borrow from
+/// the spread of all. N(ha) counts what was kept from earlier searches and initial visits, as the mean does; N does not. What was kept is of an earlier belief, and
+/// goes on to move as the tree learns: as if it were new, it would end a search that has hardly begun.
 ///
 /// So a search ends where one action is clearly the best, where several are equally good, and where all that is left of the budget would not tell which is
-/// better. Such a value of computation, with its price, is that of Hay, Russell, Tolpin and Shimony, "Selecting computations: theory and applications"
-/// (UAI 2012); the expected improvement by samples that are still to be drawn is that of Chick and Inoue, "New two-stage and sequential procedures for
-/// selecting the best simulated system" (Operations Research 49, 2001). Returns of one tree are not independent, as the tree learns: the figure is an estimate,
-/// not a bound. While all returns are equal nothing is known, and the search goes on. With a budget of time each round may end one simulation late.
+/// better. To stop where no number of further samples pays its cost is the rule of Chick and Frazier, "Sequential sampling with economics of selection
+/// procedures" (Management Science 58, 2012), and for searches that of Hay, Russell, Tolpin and Shimony, "Selecting computations: theory and applications"
+/// (UAI 2012). Theirs know the spread or allow for its error; here it is put in as it is. Returns of one tree are not independent, as the tree learns: the figure
+/// is an estimate, not a bound. While all returns are equal nothing is known, and the search goes on. With a budget of time each round may end one simulation
+/// late.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schemars", derive(schemars::JsonSchema))]
@@ -38,19 +40,19 @@ impl EarlyStop {
         require(price.is_finite() && price > 0.0, "early_stop.price", &price, "finite and positive")
     }
 
-    /// Whether to end after so many of the rounds, in which `simulations` were made.
-    pub(crate) fn is_enough(self, contest: &Contest, simulations: usize, rounds_done: usize) -> bool {
-        let a_round = simulations as f64 / rounds_done as f64;
+    /// Whether to end after so many of the rounds.
+    pub(crate) fn is_enough(self, contest: &Contest, rounds_done: usize) -> bool {
         (1..=self.rounds.saturating_sub(rounds_done)).all(|more| {
             let cost = self.price * more as f64 / self.rounds as f64;
-            contest.gain(a_round * more as f64) <= cost
+            // Of as many simulations a round as so far.
+            contest.gain(more as f64 / (rounds_done + more) as f64) <= cost
         })
     }
 }
 
 impl Config {
     /// Ends a search before its budget is spent where no more of it could be expected to add to the decision what it costs, at a price of the whole budget
-    /// (positive, in units of reward). This is asked after each of `rounds` parts of the budget (at least 2). Start with 12 rounds and a hundredth of a typical
+    /// (positive, in units of reward). This is asked after each of `rounds` parts of the budget (at least 2). Start with 24 rounds and a 150th of a typical
     /// return.
     #[must_use]
     pub fn with_early_stop(self, rounds: usize, price: f64) -> Self {
@@ -95,33 +97,30 @@ impl Moments {
 /// Degrees of freedom that an action borrows from the spread of all actions: a handful of equal returns is no proof of a spread of zero.
 const BORROWED: f64 = 4.0;
 
-/// What is known of the best action beside the others.
-pub(crate) struct Contest {
-    /// By how much the best leads each other legal action, and the squared standard error of that. `None` where an action is untried or nothing is known of
-    /// the spread.
-    leads: Option<Vec<(f64, f64)>>,
-    /// Simulations that the means are made of.
-    visits: f64,
-}
+/// What is known of the best action beside the others: by how much it leads each other legal one, and the squared standard error of that. `None` where an
+/// action is untried or nothing is known of the spread.
+pub(crate) struct Contest(Option<Vec<(f64, f64)>>);
 
 impl Contest {
     /// `legal` says which actions are.
     pub(crate) fn new(stats: &[ActionStats], returns: &[Moments], legal: &[bool], best: usize) -> Self {
-        let visits = stats.iter().map(|action| action.visits as f64).sum();
-        Self { leads: leads(stats, returns, legal, best), visits }
+        Self(leads(stats, returns, legal, best))
     }
 
-    /// The most that so many more simulations could be expected to add to the decision for the best action. It is a bound for pairs, in units of reward;
-    /// infinite where nothing is known.
-    fn gain(&self, more: f64) -> f64 {
-        let Some(leads) = &self.leads else { return f64::INFINITY };
-        let share = more / (self.visits + more);
+    /// What more simulations, that take this share off the squared errors, could be expected to add to the decision for the best action, by the other action
+    /// that promises most, in units of reward. Infinite where nothing is known.
+    fn gain(&self, share: f64) -> f64 {
+        let Some(leads) = &self.0 else { return f64::INFINITY };
         let gains = leads.iter().map(|(lead, variance)| expected_improvement(*lead, (variance * share).sqrt()));
         gains.fold(0.0, |most: f64, gain| if gain.is_nan() { f64::INFINITY } else { most.max(gain) })
     }
 }
 
 fn leads(stats: &[ActionStats], returns: &[Moments], legal: &[bool], best: usize) -> Option<Vec<(f64, f64)>> {
+    let others: Vec<usize> = (0..stats.len()).filter(|&action| action != best && legal[action]).collect();
+    if others.is_empty() {
+        return Some(Vec::new());
+    }
     let freedom: f64 = returns.iter().map(|r| r.freedom()).sum();
     if freedom == 0.0 {
         return None;
@@ -138,12 +137,11 @@ fn leads(stats: &[ActionStats], returns: &[Moments], legal: &[bool], best: usize
         let variance = (own.squares + BORROWED * pooled) / (own.freedom() + BORROWED);
         variance / stats[action].visits as f64
     };
-    let others = (0..stats.len()).filter(|&action| action != best && legal[action]);
     let lead = |action: usize| {
         let tried = stats[action].visits > 0;
         tried.then(|| (stats[best].value - stats[action].value, error(best) + error(action)))
     };
-    others.map(lead).collect()
+    others.into_iter().map(lead).collect()
 }
 
 /// E[max(0, X)] of a normal X with mean −`lead` and the standard deviation `error`.
@@ -218,7 +216,7 @@ mod tests {
 
     /// What exact values could be expected to add.
     fn open(returns: &[Moments], legal: &[bool]) -> f64 {
-        Contest::new(&stats(returns), returns, legal, 0).gain(1e300)
+        Contest::new(&stats(returns), returns, legal, 0).gain(1.0)
     }
 
     #[test]
@@ -238,7 +236,7 @@ mod tests {
         let lead = 0.1;
         let returns = [lead, 0.0].map(|mean| of(&[mean - 1.0, mean + 1.0].repeat(13)));
         let contest = Contest::new(&stats(&returns), &returns, &[true; 2], 0);
-        let variance = contest.leads.as_ref().unwrap()[0].1;
+        let variance = contest.0.as_ref().unwrap()[0].1;
         let mut rng = Seed(1).stream(Purpose::Test, 0);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let draws = 40_000;
@@ -251,7 +249,7 @@ mod tests {
             })
             .sum::<f64>()
             / f64::from(draws);
-        let expected = contest.gain(contest.visits);
+        let expected = contest.gain(0.5);
         assert!((added - expected).abs() < 0.002 && expected > 0.03, "{added}, expected {expected}");
     }
 
@@ -260,9 +258,9 @@ mod tests {
         let spread = |mean: f64| of(&[mean - 1.0, mean + 1.0].repeat(50));
         let returns = [spread(1.0), spread(0.95)];
         let contest = Contest::new(&stats(&returns), &returns, &[true; 2], 0);
-        let enough = |price: f64, done: usize| EarlyStop { rounds: 10, price }.is_enough(&contest, 200, done);
-        // Eight more rounds bring 800 simulations, which take 0.8 of the error of 0.14 squared.
-        let all = expected_improvement(0.05, (contest.leads.as_ref().unwrap()[0].1 * 0.8).sqrt());
+        let enough = |price: f64, done: usize| EarlyStop { rounds: 10, price }.is_enough(&contest, done);
+        // Eight more rounds after two take 0.8 of the error of 0.14 squared.
+        let all = expected_improvement(0.05, (contest.0.as_ref().unwrap()[0].1 * 0.8).sqrt());
         assert!(!enough(0.99 * all / 0.8, 2), "all that is left pays");
         assert!(enough(10.0 * all, 2), "no round pays");
         // Of few rounds that are left none does, where many would.
@@ -281,8 +279,10 @@ mod tests {
         let wide: Vec<f64> = (0..20).map(|i| if i % 2 == 0 { 60.0 } else { -60.0 }).collect();
         let returns = [of(&[12.0, 12.0, 12.0]), of(&wide)];
         assert!(open(&returns, &[true; 2]) > 1.0);
-        let unknown = Contest::new(&stats(&returns[..1]), &[Moments::default()], &[true], 0).gain(1e300);
-        assert_eq!(unknown, f64::INFINITY, "nothing was simulated");
+        let kept = [of(&[1.0; 3]), of(&[2.0; 3])];
+        let unknown = |legal| Contest::new(&stats(&kept), &[Moments::default(); 2], legal, 0).gain(1.0);
+        assert_eq!(unknown(&[true; 2]), f64::INFINITY, "nothing was simulated");
+        assert_eq!(unknown(&[true, false]), 0.0, "there is nothing to decide");
         let same = [of(&[-2.85; 8]), of(&[-2.85; 8])];
         assert_eq!(open(&same, &[true; 2]), f64::INFINITY, "no return has differed so far");
         let apart = [of(&[5.0; 8]), of(&[-2.85; 8])];

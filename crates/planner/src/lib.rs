@@ -54,7 +54,7 @@
 //! | one action beyond the horizon | `simulations_stop_at_the_smaller_of_depth_and_remaining_horizon` |
 //! | one simulation more than the budget | `a_simulation_clones_the_root_state_once` |
 //! | last simulation may overrun the transitions | `a_budget_of_transitions_is_never_overrun_and_nearly_used` |
-//! | a search that could gain little goes on | `a_search_ends_early_where_little_is_left_to_gain_and_spends_its_budget_where_actions_tie` |
+//! | a search goes on that would not pay | `a_search_ends_early_where_more_would_not_pay_and_spends_its_budget_where_actions_tie` |
 //! | one node more than the limit | `a_full_tree_stops_growing_and_goes_on_searching` |
 //! | a smaller key goes to the wrong side | `tree::pruning_keeps_exactly_the_subtree` |
 //! | pruning follows the first action, not the executed one | `a_pruned_tree_keeps_the_statistics_of_the_history_that_happened` |

@@ -229,8 +229,7 @@ where
         returns.iter_mut().zip(&progress.returns).for_each(|(merged, own)| merged.merge(*own));
     }
     let legal: Vec<bool> = (0..stats.len()).map(|action| roots().any(|root| root[action].legal())).collect();
-    let simulations = trees.iter().map(|(_, progress)| progress.tally.simulations).sum();
-    early.is_enough(&Contest::new(&stats, &returns, &legal, best), simulations, rounds_done)
+    early.is_enough(&Contest::new(&stats, &returns, &legal, best), rounds_done)
 }
 
 impl<M: GenerativeModel, T: Export> Planner<M, T> {

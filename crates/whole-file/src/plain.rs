@@ -50,8 +50,8 @@ const FOUND: [(&str, &str); 13] = [
     ("enum", "a name or a table"),
 ];
 
-/// Kinds of an error that decoders put before what they say, the outer ones first.
-const KINDS: [&str; 12] = [
+/// Kinds of an error that decoders put before what they say, one before the other.
+const KINDS: [&str; 15] = [
     "custom: ",
     "Custom: ",
     "ParseIntError: ",
@@ -64,6 +64,9 @@ const KINDS: [&str; 12] = [
     "Parser error: ",
     "EOF: ",
     "General: ",
+    "Io error: ",
+    "External error: ",
+    "Invalid argument error: ",
 ];
 
 /// Sentences of decoders of JSON, TOML, XML and numbers that say nothing to who writes a file.
@@ -137,7 +140,10 @@ pub fn key_of(path: &str, message: &str) -> String {
 pub fn plain(message: &str) -> String {
     let message = message.trim();
     // Decoders of XML and Parquet begin with the kind of the error, those of XML also with the place.
-    let message = KINDS.iter().fold(message, |rest, kind| rest.strip_prefix(kind).unwrap_or(rest));
+    let mut message = message;
+    while let Some(rest) = KINDS.iter().find_map(|kind| message.strip_prefix(kind)) {
+        message = rest;
+    }
     if let Some((place, reason)) = message.strip_prefix("Parse error; ").and_then(|rest| rest.split_once(", Reason: "))
     {
         return format!("{}: {}", place.replace(':', "").to_lowercase(), plain(reason));
@@ -288,6 +294,7 @@ mod tests {
             ("number too large to fit in target type", "expected a smaller whole number"),
             ("invalid type: integer `1`, expected enum Verdict", "expected a name, or a table with one key, found 1"),
             ("Parquet error: EOF: file is 3 bytes long", "file is 3 bytes long"),
+            ("Arrow: Parquet argument error: External: failed to fill whole buffer", "it ends too early"),
             ("External: failed to fill whole buffer", "it ends too early"),
             ("what nobody knows", "what nobody knows"),
             ("", ""),

@@ -150,12 +150,13 @@ fn trees_share_the_budget_and_their_number_of_threads_changes_nothing() {
 }
 
 #[test]
-fn a_search_ends_early_where_little_is_left_to_gain_and_spends_its_budget_where_actions_tie() {
-    let run = |rewards, budget, threads| {
-        let config = Config { trees: 3, threads, ..config(budget, 3) }.with_early_stop(5, 1e-9);
+fn a_search_ends_early_where_more_would_not_pay_and_spends_its_budget_where_actions_tie() {
+    let at = |price, rewards, budget, threads| {
+        let config = Config { trees: 3, threads, ..config(budget, 3) }.with_early_stop(5, price);
         let mut planner = Pomcp::new(config).unwrap();
         planner.search(&Noise::new(rewards), &START, &UniformPolicy, 3, &mut rng(0))
     };
+    let run = |rewards, budget, threads| at(1e-9, rewards, budget, threads);
     for (budget, all) in
         [(Budget::Simulations(1000), Stop::Simulations), (Budget::Transitions(3000), Stop::Transitions)]
     {
@@ -166,6 +167,8 @@ fn a_search_ends_early_where_little_is_left_to_gain_and_spends_its_budget_where_
         let open = run([1.1, 1.1, 0.9], budget, 1);
         assert_eq!(open.stop, all);
         assert!(open.transitions >= 3000 - 3 * 3, "all rounds: {}", open.transitions);
+        // Where telling them apart would bring little, a high price is not paid.
+        assert_eq!(at(10.0, [1.1, 1.1, 0.9], budget, 1).stop, Stop::LittleToGain);
     }
     // A round that affords no simulation settles nothing.
     assert_eq!(run([1.0, 9.0, 1.0], Budget::Simulations(3), 1).simulations, 3);
