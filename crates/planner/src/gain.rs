@@ -52,8 +52,8 @@ impl EarlyStop {
 
 impl Config {
     /// Ends a search before its budget is spent where no more of it could be expected to add to the decision what it costs, at a price of the whole budget
-    /// (positive, in units of reward). This is asked after each of `rounds` parts of the budget (at least 2). Start with 24 rounds and a 150th of a typical
-    /// return.
+    /// (positive, in units of reward). This is asked after each of `rounds` parts of the budget (at least 2). Start with 12 rounds and a hundredth of a
+    /// typical return.
     #[must_use]
     pub fn with_early_stop(self, rounds: usize, price: f64) -> Self {
         Self { early_stop: Some(EarlyStop { rounds, price }), ..self }
