@@ -127,7 +127,7 @@ pub fn key_of(path: &str, message: &str) -> String {
     }
 }
 
-/// The message of a serde decoder (TOML, JSON, XML or Parquet) as words: `invalid type: string "far", expected usize` becomes `expected a whole number, 0 or more, found the
+/// The message of a decoder (TOML, JSON, XML or Parquet) as words: `invalid type: string "far", expected usize` becomes `expected a whole number, 0 or more, found the
 /// text "far"`. What it does not know stays as it is.
 ///
 /// ```
