@@ -9,9 +9,9 @@ Seeds 1–99 are for development, those from 500 on for judging.
 """
 
 import argparse
-import concurrent.futures
 import json
 import math
+import multiprocessing
 import pathlib
 import shutil
 import sys
@@ -238,8 +238,9 @@ def main():
         for index in numbers:
             make(options, index)
         return 0
-    with concurrent.futures.ProcessPoolExecutor(2, max_tasks_per_child=8) as pool:
-        list(pool.map(make, [options] * len(numbers), numbers))
+    # concurrent.futures can hang where a worker ends after its last task (CPython issue 115634).
+    with multiprocessing.get_context("spawn").Pool(2, maxtasksperchild=8) as pool:
+        pool.starmap(make, [(options, index) for index in numbers], chunksize=1)
     return 0
 
 
