@@ -286,7 +286,7 @@ impl Report {
             let favoured = |name: &&str| ranking.iter().any(|rival| rival.name == *name && rival.log_evidence > 0.0);
             confusion_set.retain(favoured);
         }
-        let summary = summary(verdict, &effects, before, after);
+        let summary = summary(verdict, &effects, [before, after], diagnosis.probabilities.none);
         let description = diagnosis.is_open().then(|| describe(diagnosis));
         Self {
             version: 1,
@@ -315,7 +315,7 @@ impl Report {
                 before,
                 after,
                 noise_floor: NOISE_FLOOR,
-                closed_fraction: if verdict == Verdict::None { 1.0 } else { closed_fraction(before, after) },
+                closed_fraction: closed_fraction(before, after),
                 unit: "chi2 per sample",
                 episodes: diagnosis.reported.episodes.clone(),
                 plain: diagnosis.reported.plain.clone(),
@@ -422,7 +422,7 @@ fn retuned(diagnosis: &Diagnosis, samples: &[Vec<f64>]) -> Vec<Retuned> {
         .collect()
 }
 
-fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -> String {
+fn summary(verdict: Verdict, effects: &[NamedEffect], [before, after]: [f64; 2], none: f64) -> String {
     let names: Vec<&str> = effects.iter().map(|effect| effect.name).collect();
     let (comes, it) = if names.len() > 1 { ("come", "them") } else { ("comes", "it") };
     let names = match names.as_slice() {
@@ -441,7 +441,8 @@ fn summary(verdict: Verdict, effects: &[NamedEffect], before: f64, after: f64) -
             format!("The re-tuned model explains this log: its held-out error is {before:.2} (noise alone gives 1).")
         }
         Verdict::None => format!(
-            "This log shows no missing effect. Its held-out error is {before:.2} (noise alone gives 1); engines and real contacts differ by as much."
+            "No missing effect shows in this log, but its held-out error is {before:.2} (noise alone gives 1). Engines and real contacts can differ by \
+             as much: that nothing is missing has a probability of {none:.2}."
         ),
         Verdict::Unknown if effects.is_empty() => {
             format!(
@@ -482,6 +483,11 @@ fn describe(diagnosis: &Diagnosis) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_open_is_said() {
+        assert!(summary(Verdict::None, &[], [36.95; 2], 0.42).ends_with("has a probability of 0.42."));
+    }
 
     #[test]
     fn what_is_nearly_as_probable_is_not_told_apart() {

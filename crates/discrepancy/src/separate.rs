@@ -175,7 +175,7 @@ pub fn next_experiment(
     match (verdict, confusion_set) {
         (Verdict::None, _) if before > OPEN => contacts
             .unwrap_or(
-                "What is left is no more than engines and real contacts differ by, and may hide an effect as large. Repeat the worst episodes and change \
+                "Engines and real contacts can differ by what is left, but an effect as large may hide in it. Repeat the worst episodes and change \
                  one thing at a time: place, direction, speed, added weight, time.",
             )
             .into(),

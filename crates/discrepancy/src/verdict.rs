@@ -93,6 +93,12 @@ mod tests {
     use crate::likelihood::Stack;
     use crate::rival::{Heldout, Rival};
 
+    #[test]
+    fn what_no_effect_explains_is_not_closed() {
+        let closed = [[37.0, 37.0], [3.0, 2.0], [0.9, 0.9]].map(|[before, after]| closed_fraction(before, after));
+        assert_eq!(closed, [0.0, 0.5, 1.0]);
+    }
+
     /// With the first effects of the catalogue from `first` on.
     fn fit(first: usize, effects: usize) -> Fit {
         let all = candidates(&context());
