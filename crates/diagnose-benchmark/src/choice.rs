@@ -1,10 +1,12 @@
 //! Conditional logit with a Gaussian prior (McFadden, "Conditional logit analysis of qualitative choice behavior", 1974).
 //!
-//! Alternative a of choice i has the score xᵢₐ · θ and is chosen with probability softmaxₐ(xᵢₐ · θ).
+//! Alternative a of choice i has the score xᵢₐ · θ and is chosen with probability softmaxₐ(xᵢₐ · θ). Where several would have been right, the probability is
+//! that of all of them together.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Steps of Newton's method: the cost is convex.
+/// Steps of Newton's method. The cost is convex where each choice has one right alternative. Where one has several, the curvature leaves out what makes it
+/// less so, as in expectation maximisation: each step still goes down.
 const STEPS: usize = 100;
 
 /// What there was to choose from.
@@ -12,8 +14,8 @@ const STEPS: usize = 100;
 pub struct Choice {
     /// Features of each alternative.
     pub alternatives: Vec<DVector<f64>>,
-    /// Place of the one that was right.
-    pub chosen: usize,
+    /// Places of those that were right, at least one: which of them was meant is not known.
+    pub chosen: Vec<usize>,
     /// How often it counts.
     pub weight: f64,
 }
@@ -25,6 +27,11 @@ impl Choice {
         let exponentials: Vec<f64> = scores.iter().map(|score| (score - most).exp()).collect();
         let sum: f64 = exponentials.iter().sum();
         exponentials.into_iter().map(|share| share / sum).collect()
+    }
+
+    /// The share of all that were right.
+    fn of_chosen(&self, shares: &[f64]) -> f64 {
+        self.chosen.iter().map(|place| shares[*place]).sum()
     }
 }
 
@@ -40,7 +47,7 @@ pub fn fit(choices: &[Choice], priors: &[Prior]) -> DVector<f64> {
     let cost = |theta: &DVector<f64>| -> f64 {
         let away = theta - &begin;
         let prior: f64 = away.iter().zip(&precision).map(|(x, precision)| 0.5 * precision * x * x).sum();
-        prior + choices.iter().map(|choice| -choice.weight * choice.shares(theta)[choice.chosen].ln()).sum::<f64>()
+        prior + choices.iter().map(|choice| -choice.weight * choice.of_chosen(&choice.shares(theta)).ln()).sum::<f64>()
     };
     let mut theta = begin.clone();
     let mut now = cost(&theta);
@@ -54,7 +61,11 @@ pub fn fit(choices: &[Choice], priors: &[Prior]) -> DVector<f64> {
                 mean.axpy(*share, x, 1.0);
                 curvature.ger(choice.weight * share, x, x, 1.0);
             }
-            slope += choice.weight * (&mean - &choice.alternatives[choice.chosen]);
+            slope.axpy(choice.weight, &mean, 1.0);
+            let chosen = choice.of_chosen(&shares);
+            for &place in &choice.chosen {
+                slope.axpy(-choice.weight * shares[place] / chosen, &choice.alternatives[place], 1.0);
+            }
             curvature.ger(-choice.weight, &mean, &mean, 1.0);
         }
         let Some(step) = curvature.cholesky().map(|cholesky| cholesky.solve(&slope)) else { break };
@@ -90,7 +101,7 @@ mod tests {
     fn with_an_offset_each_scores_are_the_logarithms_of_the_frequencies() {
         let alternatives = || (0..3).map(|place| unit(3, place)).collect();
         let choices: Vec<Choice> = [0, 0, 0, 0, 0, 0, 1, 1, 1, 2]
-            .map(|chosen| Choice { alternatives: alternatives(), chosen, weight: 1.0 })
+            .map(|chosen| Choice { alternatives: alternatives(), chosen: vec![chosen], weight: 1.0 })
             .to_vec();
         let found = fit(&choices, &[(0.0, 100.0); 3]);
         // The prior of the offsets draws them together by less than a hundredth.
@@ -99,8 +110,22 @@ mod tests {
     }
 
     #[test]
+    fn which_of_two_was_meant_is_shared_as_others_say() {
+        let choice = |chosen: &[usize], weight| {
+            let alternatives = (0..3).map(|place| unit(3, place)).collect();
+            Choice { alternatives, chosen: chosen.to_vec(), weight }
+        };
+        // Nine of a or b, of which the others were a twice as often as b: as six more of a, and three of b.
+        let choices = [choice(&[0], 2.0), choice(&[1], 1.0), choice(&[2], 3.0), choice(&[0, 1], 9.0)];
+        let found = fit(&choices, &[(0.0, 1000.0); 3]);
+        assert!((found[0] - found[1] - 2.0_f64.ln()).abs() < 0.01, "{found}");
+        assert!((found[0] - found[2] - (8.0_f64 / 3.0).ln()).abs() < 0.01, "{found}");
+    }
+
+    #[test]
     fn one_that_counts_twice_is_two() {
-        let choice = |chosen, weight| Choice { alternatives: vec![unit(2, 0), unit(2, 1)], chosen, weight };
+        let choice =
+            |chosen, weight| Choice { alternatives: vec![unit(2, 0), unit(2, 1)], chosen: vec![chosen], weight };
         let twice = fit(&[choice(0, 2.0), choice(1, 1.0)], &[(0.0, 1.0); 2]);
         let two = fit(&[choice(0, 1.0), choice(0, 1.0), choice(1, 1.0)], &[(0.0, 1.0); 2]);
         assert!((twice - two).norm() < 1e-9);
@@ -113,7 +138,7 @@ mod tests {
             .map(|i| {
                 let alternatives =
                     (0..2 + i % 3).map(|a| DVector::from_element(1, ((7 * i + 5 * a) % 11) as f64 / 5.0));
-                Choice { alternatives: alternatives.collect(), chosen: usize::from(i % 5 == 0), weight: 1.0 }
+                Choice { alternatives: alternatives.collect(), chosen: vec![usize::from(i % 5 == 0)], weight: 1.0 }
             })
             .collect();
         let (variance, found) = (0.5, fit(&choices, &[(0.0, 0.5)]));
@@ -121,7 +146,7 @@ mod tests {
             .iter()
             .map(|choice| {
                 let expected: f64 = choice.alternatives.iter().zip(choice.shares(&found)).map(|(x, p)| p * x[0]).sum();
-                choice.alternatives[choice.chosen][0] - expected
+                choice.alternatives[choice.chosen[0]][0] - expected
             })
             .sum();
         assert!(found[0] != 0.0 && (slope - found[0] / variance).abs() < 1e-6, "{slope} {found}");
@@ -130,14 +155,15 @@ mod tests {
     #[test]
     fn what_nothing_is_learnt_of_stays_where_it_began() {
         let alternatives = vec![unit(3, 0), unit(3, 1)];
-        let found = fit(&[Choice { alternatives, chosen: 0, weight: 1.0 }], &[(0.5, 0.1), (-0.5, 1e-9), (7.0, 1.0)]);
+        let found =
+            fit(&[Choice { alternatives, chosen: vec![0], weight: 1.0 }], &[(0.5, 0.1), (-0.5, 1e-9), (7.0, 1.0)]);
         assert!(found[0] > 0.5 && (found[1] + 0.5).abs() < 1e-6 && found[2] == 7.0, "{found}");
     }
 
     #[test]
     fn what_is_always_chosen_leaves_finite_weights() {
         let alternatives = vec![DVector::from_element(1, 1.0), DVector::from_element(1, -1.0)];
-        let found = fit(&vec![Choice { alternatives, chosen: 0, weight: 1.0 }; 4], &[(0.0, 1.0)]);
+        let found = fit(&vec![Choice { alternatives, chosen: vec![0], weight: 1.0 }; 4], &[(0.0, 1.0)]);
         assert!(found[0] > 0.3 && found[0] < 3.0, "{found}");
     }
 }

@@ -1,7 +1,7 @@
 //! A log with its answer, and what it teaches.
 //!
 //! Logs of other engines: a folder holds `log-NNN/` and `truth/log-NNN.json`, as `tests/peers/worlds/make_logs.py` writes them; answers lie in
-//! `ANSWERS/FOLDER/log-NNN/report.json`.
+//! `ANSWERS/FOLDER/log-NNN/report.json`. What they teach is kept in a file with one example a line, so that it can be taught again without them.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -24,7 +24,7 @@ const OWN_EPISODES: usize = 40;
 const SKEW_SECS: f64 = 0.05;
 
 /// What a log hides.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Truth {
     /// Engine that made it.
     pub engine: String,
@@ -48,7 +48,7 @@ pub struct Truth {
 }
 
 /// A hidden effect.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Named {
     /// Name.
     pub name: String,
@@ -58,6 +58,16 @@ pub struct Named {
 }
 
 impl Named {
+    /// Of an effect in a world of ours.
+    #[must_use]
+    pub fn new(effect: &EffectConfig) -> Self {
+        let kind = effect.kind();
+        let parameters = (kind.parameters().iter().zip(effect.values()))
+            .map(|(parameter, value)| (parameter.name.to_string(), value.into()))
+            .collect();
+        Self { name: kind.name().into(), parameters }
+    }
+
     /// Whether it is re-tuned like a mass, and no diagnosis names it.
     fn is_re_tuned(&self) -> bool {
         let delay_secs = || self.parameters.get("delay_secs").and_then(serde_json::Value::as_f64);
@@ -132,13 +142,15 @@ impl Value {
         let end = if truth > self.value { high } else { low };
         match (truth - self.value, end.map(|end| end - self.value)) {
             (0.0, _) | (_, None) => 0.0,
-            (away, Some(reach)) => (away.abs() / reach.abs()).min(f64::INFINITY),
+            // JSON has no infinity.
+            (away, Some(reach)) => (away.abs() / reach.abs()).min(f64::MAX),
         }
     }
 }
 
 /// A log with its answer.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
 pub struct Example {
     /// Folder and name.
     pub log: String,
@@ -153,6 +165,7 @@ pub struct Example {
     /// Duration, s.
     pub seconds: f64,
     /// Whether what it hides was withheld from what was compared.
+    #[serde(skip)]
     pub withheld: bool,
 }
 
@@ -161,7 +174,7 @@ impl Example {
     /// compare it, or nothing else.
     #[must_use]
     pub fn without_truth(&self) -> Option<Self> {
-        if self.truth.kind() != Kind::Effect || self.label() >= self.findings.len() {
+        if self.truth.kind() != Kind::Effect || !self.compares_truth() {
             return None;
         }
         let same = |found: &Findings, hidden: &Named| {
@@ -174,39 +187,74 @@ impl Example {
         (!other.findings.is_empty()).then_some(other)
     }
 
-    /// The alternative that it teaches: the place of the effect that is right among those that were compared; then nothing, then something else.
-    pub(crate) fn label(&self) -> usize {
+    /// Whether the search compared what it hides.
+    pub(crate) fn compares_truth(&self) -> bool {
+        self.findings.iter().any(|found| self.truth.names(&found.effect))
+    }
+
+    /// The alternatives that are right, by their places: the effects that were compared, then nothing, then something else. Of a pair both are. What is
+    /// hidden but does not show may be named or not.
+    pub(crate) fn right(&self) -> Vec<usize> {
         let compared = self.findings.len();
+        let hidden = (0..compared).filter(|&place| self.truth.names(&self.findings[place].effect));
         match self.truth.kind() {
-            Kind::None => compared,
-            Kind::Outside => compared + 1,
-            Kind::Effect => {
-                let right = self.findings.iter().position(|found| self.truth.names(&found.effect));
-                right.unwrap_or(compared + 1)
-            }
+            Kind::None if self.truth.outside.is_empty() => hidden.chain([compared]).collect(),
+            Kind::None => vec![compared, compared + 1],
+            Kind::Effect if self.compares_truth() => hidden.collect(),
+            Kind::Effect | Kind::Outside => vec![compared + 1],
         }
     }
 
-    /// The probability of what it teaches.
-    pub(crate) fn of_label(&self, found: &Probabilities) -> f64 {
-        let label = self.label();
-        match self.findings.get(label) {
+    /// The probability of what is right.
+    pub(crate) fn of_right(&self, found: &Probabilities) -> f64 {
+        let compared = self.findings.len();
+        let of = |place: usize| match self.findings.get(place) {
             Some(right) => found.of(&right.effect),
-            None if label == self.findings.len() => found.none,
+            None if place == compared => found.none,
             None => found.unknown,
-        }
+        };
+        self.right().into_iter().map(of).sum()
     }
 }
 
-/// Reads the logs of `folder` that have an answer in `answers`.
+/// Reads the examples of a file, or of a folder of logs: those that have an answer in `answers`.
 ///
 /// # Errors
 ///
-/// Where a file cannot be read.
-pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
-    if folder.join("plan.json").exists() {
-        return read_own(folder);
+/// Where a file cannot be read, or a folder of logs comes without answers.
+pub fn read(path: &Path, answers: Option<&Path>) -> Result<Vec<Example>> {
+    if path.is_file() {
+        return read_kept(path);
     }
+    if path.join("plan.json").exists() {
+        return read_own(path);
+    }
+    let answers =
+        answers.with_context(|| format!("{}: logs need --answers, the folder of their answers", path.display()))?;
+    read_folder(path, answers)
+}
+
+fn read_kept(path: &Path) -> Result<Vec<Example>> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let of_line = |(number, line): (usize, &str)| {
+        serde_json::from_str(line).with_context(|| {
+            format!("{}: line {}: expected an example of diagnose-learn --examples", path.display(), number + 1)
+        })
+    };
+    text.lines().enumerate().map(of_line).collect()
+}
+
+/// One example a line.
+///
+/// # Errors
+///
+/// None: all numbers of an example are finite.
+pub fn to_lines(examples: &[Example]) -> Result<String> {
+    let line = |example| Ok(serde_json::to_string(example)? + "\n");
+    examples.iter().map(line).collect()
+}
+
+fn read_folder(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
     let folder_name = folder.file_name().context("expected the name of a folder of logs")?;
     let truths = folder.join("truth");
     let listed = std::fs::read_dir(&truths).with_context(|| format!("cannot read {}", truths.display()))?;
@@ -230,6 +278,7 @@ pub fn read(folder: &Path, answers: &Path) -> Result<Vec<Example>> {
 fn read_own(folder: &Path) -> Result<Vec<Example>> {
     let identity: Identity = crate::folder::read(&folder.join("plan.json"))?;
     let plan = Plan::new(identity.options.clone());
+    let folder_name = folder.file_name().context("expected the name of a folder of logs")?.to_string_lossy();
     let mut examples = Vec::new();
     for set in 0..plan.len() {
         let [truth, report] = ["truth", "answers"].map(|part| folder.join(part).join(name(set)));
@@ -242,25 +291,19 @@ fn read_own(folder: &Path) -> Result<Vec<Example>> {
         if own.spec.unknown.is_some() {
             continue;
         }
-        let named = |effect: &EffectConfig| Named {
-            name: effect.kind().name().into(),
-            parameters: (effect.kind().parameters().iter().zip(effect.values()))
-                .map(|(parameter, value)| (parameter.name.to_string(), value.into()))
-                .collect(),
-        };
         let truth = Truth {
             engine: "rapier".into(),
             variant: "other settings".into(),
             seed: identity.options.seed,
-            effects: own.spec.effects.iter().map(named).collect(),
+            effects: own.spec.effects.iter().map(Named::new).collect(),
             outside: own.spec.unknown.iter().map(|unknown| serde_json::Value::from(unknown.name())).collect(),
             // They begin where they show.
-            detectable: Some(f64::INFINITY),
+            detectable: Some(f64::MAX),
             natural: Vec::new(),
             designed: own.spec.actions == Actions::Designed,
             episodes: OWN_EPISODES,
         };
-        examples.extend(example(format!("rapier/{}", name(set)), truth, crate::folder::read(&report)?));
+        examples.extend(example(format!("{folder_name}/{}", name(set)), truth, crate::folder::read(&report)?));
     }
     Ok(examples)
 }
@@ -339,7 +382,7 @@ pub(crate) mod tests {
         let without = log.without_truth().unwrap();
         let left: Vec<&str> = without.findings.iter().map(|found| found.effect.as_str()).collect();
         // A constant force does what a tilt does.
-        assert_eq!((left, without.truth.kind(), without.label()), (vec!["viscous_damping"], Kind::Outside, 2));
+        assert_eq!((left, without.truth.kind(), without.right()), (vec!["viscous_damping"], Kind::Outside, vec![2]));
         assert!(without.withheld && without.without_truth().is_none());
     }
 
@@ -366,10 +409,43 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn what_is_hidden_and_does_not_show_may_be_named_or_not() {
+        let mut log = example("a", true, "table_tilt", 10.0);
+        assert_eq!(log.right(), [0]);
+        log.truth.detectable = Some(0.5);
+        assert_eq!(log.right(), [0, 1]);
+        let found =
+            |effect, none, unknown| Probabilities { effects: vec![("table_tilt".into(), effect)], none, unknown };
+        assert!((log.of_right(&found(0.5, 0.3, 0.2)) - 0.8).abs() < 1e-12);
+        log.truth.outside.push("magnet".into());
+        assert_eq!(log.right(), [1, 2]);
+        // Nothing is hidden.
+        let none = example("a", false, "table_tilt", 10.0);
+        assert_eq!(none.right(), [1]);
+    }
+
+    #[test]
+    fn examples_are_read_as_they_were_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("examples.jsonl");
+        let mut log = example("a", true, "table_tilt", 1.0 / 3.0);
+        log.off = vec![0.1, f64::MAX];
+        let lines = to_lines(&[log.clone(), log]).unwrap();
+        std::fs::write(&path, &lines).unwrap();
+        let read = read(&path, None).unwrap();
+        assert_eq!((read.len(), to_lines(&read).unwrap()), (2, lines.clone()));
+        std::fs::write(&path, lines + "{}\n").unwrap();
+        let error = format!("{:#}", super::read(&path, None).unwrap_err());
+        assert!(error.contains("examples.jsonl: line 3"), "{error}");
+        let error = super::read(folder.path(), None).unwrap_err().to_string();
+        assert!(error.contains("--answers"), "{error}");
+    }
+
+    #[test]
     fn how_far_a_value_is_off_is_counted_in_the_reach_of_its_interval() {
         let value = |interval90| Value { key: "slope_x_rad".into(), value: 1.0, interval90 };
         assert_eq!([0.5, 1.0, 2.0].map(|truth| value([Some(0.0), Some(1.5)]).off(truth)), [0.5, 0.0, 2.0]);
         // An end that is none holds everything; an interval that ends at its value nothing beyond.
-        assert_eq!([value([None, Some(2.0)]).off(-9.0), value([Some(1.0), Some(2.0)]).off(0.5)], [0.0, f64::INFINITY]);
+        assert_eq!([value([None, Some(2.0)]).off(-9.0), value([Some(1.0), Some(2.0)]).off(0.5)], [0.0, f64::MAX]);
     }
 }

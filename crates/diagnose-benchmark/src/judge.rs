@@ -27,7 +27,9 @@ pub struct Judged {
     pub by_size: [[u32; 3]; 3],
     /// Logs of few episodes, and wrong names there with a confidence of 0.9 and more.
     pub few: [u32; 2],
-    /// Logs without one, and how many are called `none`.
+    /// Logs whose effect does not show and is named nevertheless, rightly.
+    pub slight: u32,
+    /// The other logs without one that shows, and how many are called `none`.
     pub none: [u32; 2],
     /// Of these how many are called `effect`.
     pub false_alarms: u32,
@@ -79,13 +81,12 @@ pub fn judge(judged: &[Judgement]) -> Judged {
     let mut bins = [(0.0, 0_u32, 0_u32); 10];
     for Judgement { example, found, width } in judged {
         let (verdict, (name, probability)) = (found.verdict(), found.best());
-        let hidden = example.truth.kind() == Kind::Effect;
-        let right = hidden && example.truth.names(name);
+        let right = example.truth.names(name);
         match example.truth.kind() {
             Kind::Effect => {
                 counts.effects[0] += 1;
                 counts.first += u32::from(right);
-                let compared = example.label() < example.findings.len();
+                let compared = example.compares_truth();
                 counts.compared += u32::from(compared);
                 let size = example.truth.detectable.unwrap_or(0.0);
                 let bin = &mut counts.by_size[EDGES.iter().filter(|edge| size >= **edge).count()];
@@ -94,6 +95,7 @@ pub fn judge(judged: &[Judgement]) -> Judged {
                 counts.effects[1] += u32::from(right && verdict == Verdict::Effect);
                 counts.twins += u32::from(!right && verdict == Verdict::Effect && names_twin(&example.truth, name));
             }
+            Kind::None if right && verdict == Verdict::Effect => counts.slight += 1,
             Kind::None => {
                 counts.none[0] += 1;
                 counts.none[1] += u32::from(verdict == Verdict::None);
@@ -115,7 +117,7 @@ pub fn judge(judged: &[Judgement]) -> Judged {
             counts.intervals[0] += example.off.len() as u32;
             counts.intervals[1] += example.off.iter().filter(|off| *off <= width).count() as u32;
         }
-        counts.log_loss -= example.of_label(found).ln() / judged.len() as f64;
+        counts.log_loss -= example.of_right(found).ln() / judged.len() as f64;
         counts.rollouts += example.rollouts as f64 / judged.len() as f64;
         counts.seconds += example.seconds / judged.len() as f64;
     }

@@ -32,7 +32,7 @@ pub fn learn(examples: &[&Example], earlier: Option<&Decision>, provenance: serd
             let (own, others): (Vec<&Example>, Vec<&Example>) =
                 examples.iter().copied().partition(|example| example.truth.engine == **engine);
             let decision = regress(&others, earlier, variance, serde_json::Value::Null);
-            own.iter().map(|example| -example.of_label(&decision.probabilities(&example.findings)).ln()).sum()
+            own.iter().map(|example| -example.of_right(&decision.probabilities(&example.findings)).ln()).sum()
         };
         engines(examples).iter().map(left_out).sum()
     };
@@ -118,7 +118,7 @@ fn regress(
         let effects = rows.iter().map(|row| alternative(0, standardised(row, &effect_scales).collect()));
         let log: Vec<f64> = standardised(&of_log(example), &log_scales).collect();
         let alternatives = effects.chain([alternative(1, log.clone()), alternative(2, log)]).collect();
-        Choice { alternatives, chosen: example.label(), weight }
+        Choice { alternatives, chosen: example.right(), weight }
     };
     let withheld: Vec<Example> = examples.iter().filter_map(|example| example.without_truth()).collect();
     let outside = examples.iter().filter(|example| example.truth.kind() == Kind::Outside).count();

@@ -5,7 +5,9 @@
 
 use std::sync::Arc;
 
-use measured_log::{Header, Log, Noise, Number, Object, Robot as Arm, Shape, SplitConfig, Table};
+use measured_log::{
+    Axis, Channel, Episode, Header, Log, Noise, Number, Object, Robot as Arm, Shape, SplitConfig, Table,
+};
 use nalgebra::Vector3;
 use physics_model::config::WorldConfig;
 use physics_model::rig::{Rig, RigObject, RigShape, RigTool};
@@ -68,6 +70,30 @@ pub fn record(problem: &Problem, actions: Actions, seed: Seed) -> Result<Log, Re
         seed,
     };
     recording.log(header, scripts.iter().enumerate())
+}
+
+/// Mean square, in noise variances, by which readings of a log differ from those of another with the same pushes and noise: `detectable` of a truth.
+#[must_use]
+pub fn difference(log: &Log, other: &Log) -> f64 {
+    let noise = &log.header.noise;
+    let vectors = [
+        (Channel::ObjectPosition as fn(Axis) -> Channel, noise.object_position_m),
+        (Channel::Tool, noise.tool_position_m),
+        (Channel::WristForce, noise.wrist_force_n),
+        (Channel::WristTorque, noise.wrist_torque_nm),
+    ];
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (a, b) in log.episodes.iter().zip(&other.episodes) {
+        for row in 0..a.rows().min(b.rows()) {
+            for (channel, stddev) in vectors {
+                let read = |episode: &Episode| episode.vector(channel, row).map(Vector3::from);
+                if let (Some(a), Some(b), Some(stddev)) = (read(a), read(b), stddev) {
+                    (sum, count) = (sum + (a - b).norm_squared() / (stddev * stddev), count + 3.0);
+                }
+            }
+        }
+    }
+    if count > 0.0 { sum / count } else { 0.0 }
 }
 
 /// How far a tool reaches from its centre along the table, m. An open hand reaches farther than the first of its parts, with which it would begin in the object.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context as _, Result, bail};
 use clap::Parser;
-use diagnose_benchmark::example::{Example, read};
+use diagnose_benchmark::example::{Example, read, to_lines};
 use diagnose_benchmark::judge::{Judged, judge, judge_withheld};
 use diagnose_benchmark::learn::{Judgement, learn, leave_one_engine_out};
 use discrepancy::decision::Decision;
@@ -18,12 +18,15 @@ use whole_file::Existing;
 #[derive(Debug, Parser)]
 #[command(name = "diagnose-learn", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Folders of logs, each with a folder truth beside them.
+    /// Folders of logs, each with a folder truth beside them, or files that --examples wrote.
     #[arg(required = true)]
     logs: Vec<PathBuf>,
     /// Folder of the answers of diagnose: ANSWERS/FOLDER/LOG/report.json.
     #[arg(long)]
-    answers: PathBuf,
+    answers: Option<PathBuf>,
+    /// File for what is read of logs and answers, one log a line: enough to learn again without them.
+    #[arg(long)]
+    examples: Option<PathBuf>,
     /// File that the decision is written to; none: it is judged alone.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -41,6 +44,7 @@ struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask diagnose-learn runs/worlds/mujoco-all-seed11 runs/worlds/bullet-all-seed11 --answers runs/answers --table runs/table
+  cargo xtask diagnose-learn assets/diagnose/examples.jsonl --out runs/decision.json
   cargo xtask diagnose-learn runs/worlds/mujoco-all-seed501 --answers runs/answers --unseen assets/diagnose/decision.json";
 
 /// The table.
@@ -62,7 +66,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     check_places(arguments)?;
     let mut examples: Vec<Example> = Vec::new();
     for folder in &arguments.logs {
-        examples.extend(read(folder, &arguments.answers)?);
+        examples.extend(read(folder, arguments.answers.as_deref())?);
     }
     let mut engines: Vec<String> = examples.iter().map(|example| example.truth.engine.clone()).collect();
     engines.sort_unstable();
@@ -75,7 +79,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         );
     }
     let earlier = arguments.from.as_deref().map(begun_from).transpose()?;
-    let provenance = provenance(arguments, &examples, earlier.as_ref());
+    let provenance = provenance(&examples, earlier.as_ref());
     let withheld = examples.iter().filter_map(Example::without_truth);
     let all: Vec<Example> = examples.iter().cloned().chain(withheld).collect();
     let judged = match &arguments.unseen {
@@ -101,6 +105,9 @@ fn run(arguments: &Arguments) -> Result<()> {
             write(file, text)?;
         }
     }
+    if let Some(path) = &arguments.examples {
+        write(path, &to_lines(&examples)?)?;
+    }
     if let Some(out) = &arguments.out {
         let all: Vec<&Example> = examples.iter().collect();
         write(out, &(serde_json::to_string_pretty(&learn(&all, earlier.as_ref(), provenance))? + "\n"))?;
@@ -123,6 +130,9 @@ fn check_places(arguments: &Arguments) -> Result<()> {
             whole_file::check_own(&text, "a table", |text| text.starts_with("| engine |"))?;
             whole_file::check_own(&numbers, "a table", |text| text.starts_with("{\n  \"provenance\""))?;
         }
+    }
+    if let Some(path) = &arguments.examples {
+        whole_file::check_own(path, "a file of examples", |text| text.starts_with("{\"log\":"))?;
     }
     if let Some(out) = &arguments.out {
         whole_file::check_own(out, "a decision", |text| serde_json::from_str::<Decision>(text).is_ok())?;
@@ -175,7 +185,7 @@ fn write(path: &std::path::Path, text: &str) -> Result<()> {
 /// The key of a provenance with that of the decision that another one began from.
 const BEGUN_FROM: &str = "begun_from";
 
-fn provenance(arguments: &Arguments, examples: &[Example], earlier: Option<&Decision>) -> serde_json::Value {
+fn provenance(examples: &[Example], earlier: Option<&Decision>) -> serde_json::Value {
     let mut sets: Vec<(String, u64, usize)> = Vec::new();
     for example in examples {
         let name = format!("{} {}", example.truth.engine, example.truth.variant);
@@ -185,8 +195,8 @@ fn provenance(arguments: &Arguments, examples: &[Example], earlier: Option<&Deci
         }
     }
     sets.sort();
-    let folders: Vec<String> =
-        (arguments.logs.iter()).filter_map(|folder| Some(folder.file_name()?.to_string_lossy().into_owned())).collect();
+    let mut folders: Vec<&str> = examples.iter().filter_map(|example| Some(example.log.split_once('/')?.0)).collect();
+    folders.dedup();
     let sets: Vec<_> = (sets.iter())
         .map(|(engine, seed, logs)| serde_json::json!({ "engine": engine, "seed": seed, "logs": logs }))
         .collect();
@@ -244,6 +254,7 @@ fn markdown(table: &Table) -> String {
         logs - named,
         all.twins
     );
+    let _ = writeln!(text, "\nIn {} further logs the effect shows less, and is named rightly.", all.slight);
     let [logs, unknown, named, sure] = table.withheld;
     let _ = writeln!(
         text,

@@ -1,14 +1,16 @@
 //! `cargo xtask record-log`: a log of the true world of a scenario, to rehearse a diagnosis before a robot is at hand.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 use clap::Parser;
+use diagnose_benchmark::example::{Named, Truth};
 use diagnose_benchmark::generate::Actions;
-use diagnose_benchmark::rehearsal::record;
+use diagnose_benchmark::rehearsal::{difference, record};
 use discrepancy::ModelFile;
-use measured_log::{Episode, Format, Notes};
+use measured_log::{Episode, Format, Log, Notes};
+use physics_model::EffectConfig;
 use pomdp::Seed;
 use program::typed;
 use scenario::{Problem, Selection};
@@ -36,6 +38,9 @@ struct Arguments {
     /// Folder of the log; it must not hold one yet.
     #[arg(long)]
     out: PathBuf,
+    /// File for what the log hides, as diagnose-learn reads it: TRUTH/log-000.json of a log in FOLDER/log-000, where TRUTH is FOLDER/truth.
+    #[arg(long)]
+    truth: Option<PathBuf>,
     /// Project folder [default: the nearest one above with scenarios/base.toml].
     #[arg(long)]
     root: Option<PathBuf>,
@@ -64,7 +69,13 @@ fn run(arguments: &Arguments) -> Result<()> {
     if !arguments.out.join("log.toml").exists() && model_file.exists() {
         bail!("{}: exists without log.toml beside it: choose another --out", model_file.display());
     }
+    if let Some(truth) = &arguments.truth {
+        whole_file::check_own(truth, "what a log hides", |text| serde_json::from_str::<Truth>(text).is_ok())?;
+    }
     let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
+    let truth = (arguments.truth.as_ref())
+        .map(|path| anyhow::Ok((path, truth(arguments, &root, &problem, &log)?)))
+        .transpose()?;
     match measured_log::write(&arguments.out, &log, Format::Csv, &Notes::new()) {
         Err(taken @ measured_log::Error::Exists { .. }) => return Err(taken.into()),
         Err(error) => return Err(program::failed(error)),
@@ -72,10 +83,36 @@ fn run(arguments: &Arguments) -> Result<()> {
     }
     let model = ModelFile::of_effects(problem.scenario.effects.model.clone()).to_toml()?;
     whole_file::write(&model_file, model.as_bytes(), Existing::Replace).map_err(program::failed)?;
+    if let Some((path, truth)) = truth {
+        let text = serde_json::to_string_pretty(&truth)? + "\n";
+        whole_file::write(path, text.as_bytes(), Existing::Replace).map_err(program::failed)?;
+    }
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
     program::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
     let (folder, model) = (typed(&arguments.out), typed(&model_file));
     let words = ["cargo", "xtask", "diagnose", "--measured", &folder, "--model", &model];
     program::next(&[(words.map(String::from).to_vec(), "finds what the log shows and the model lacks")]);
     Ok(())
+}
+
+/// What a log of this problem hides, beside the same log without it.
+fn truth(arguments: &Arguments, root: &Path, problem: &Problem, log: &Log) -> Result<Truth> {
+    let mut scenario = problem.scenario.clone();
+    let effects = &mut scenario.effects;
+    let (known, hidden) =
+        std::mem::take(&mut effects.truth).into_iter().partition(|effect| effects.model.contains(effect));
+    effects.truth = known;
+    let hidden: Vec<EffectConfig> = hidden;
+    let without = record(&Problem::assemble(&scenario, root)?, arguments.actions, Seed(arguments.seed))?;
+    Ok(Truth {
+        engine: "rapier".into(),
+        variant: arguments.robot.clone(),
+        seed: arguments.seed,
+        effects: hidden.iter().map(Named::new).collect(),
+        outside: Vec::new(),
+        detectable: Some(difference(log, &without)),
+        natural: Vec::new(),
+        designed: arguments.actions == Actions::Designed,
+        episodes: log.episodes.len(),
+    })
 }

@@ -49,7 +49,7 @@ fn logistic(names: &[&str], examples: &[(Vec<f64>, bool)]) -> Logistic {
     let choice = |(features, is): &(Vec<f64>, bool)| {
         let row = DVector::from_vec(fitted.row(features));
         let none = DVector::zeros(row.len());
-        Choice { alternatives: vec![row, none], chosen: usize::from(!is), weight: 1.0 }
+        Choice { alternatives: vec![row, none], chosen: vec![usize::from(!is)], weight: 1.0 }
     };
     let choices: Vec<Choice> = examples.iter().map(choice).collect();
     let mut priors = vec![(0.0, 1.0); names.len() + 1];
