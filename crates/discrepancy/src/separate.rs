@@ -175,8 +175,8 @@ pub fn next_experiment(
     match (verdict, confusion_set) {
         (Verdict::None, _) if before > OPEN => contacts
             .unwrap_or(
-                "Engines and real contacts can differ by what is left, but an effect as large may hide in it. Repeat the worst episodes and change \
-                 one thing at a time: place, direction, speed, added weight, time.",
+                "Engines and real contacts can differ by what is left, and that may hide an effect as large. Repeat the worst episodes and change one \
+                 thing at a time: place, direction, speed, added weight, time.",
             )
             .into(),
         (Verdict::None, []) => format!("None is needed. Smaller effects would show in {DESIGNED}."),
