@@ -202,3 +202,38 @@ fn published_results_that_the_help_of_report_names_have_pages() {
         assert!(output.status.success(), "{run_folder}: {}", stderr(&output));
     }
 }
+
+#[test]
+fn what_a_log_hides_is_written_once_and_outside_of_the_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let record = |log: &str, truth: &str| {
+        let [log, truth] = [log, truth].map(|name| folder.path().join(name));
+        run("record-log", &format!("--actions passive --out {} --truth {}", log.display(), truth.display()))
+    };
+    let output = record("log", "truth.json");
+    assert!(output.status.success(), "{}", stderr(&output));
+    let truth = std::fs::read_to_string(folder.path().join("truth.json")).unwrap();
+    assert!(truth.contains("table_tilt") && !truth.contains("rolling_resistance"), "{truth}");
+    for (log, truth) in [("second", "truth.json"), ("second", "second/truth.json")] {
+        let output = record(log, truth);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(
+            stderr(&output).contains("expected a file that is not there, outside of the log"),
+            "{}",
+            stderr(&output)
+        );
+        assert!(!folder.path().join("second").exists());
+    }
+    assert_eq!(std::fs::read_to_string(folder.path().join("truth.json")).unwrap(), truth);
+}
+
+#[test]
+fn what_logs_teach_is_learnt_again_from_one_file_and_each_log_counts_once() {
+    let examples = root().join("assets/results/diagnose-worlds/seeds-51-52-91.jsonl");
+    let judge = |logs: &str| run("diagnose-learn", logs);
+    let output = judge(&examples.display().to_string());
+    let table = String::from_utf8(output.stdout).unwrap();
+    assert!(table.lines().any(|line| line.starts_with("| all | 167 | ") && line.contains(" of 59 (")), "{table}");
+    let output = judge(&format!("{0} {0}", examples.display()));
+    assert!(output.status.code() == Some(2) && stderr(&output).contains("is there twice"), "{}", stderr(&output));
+}

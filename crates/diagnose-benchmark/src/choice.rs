@@ -5,8 +5,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Steps of Newton's method. The cost is convex where each choice has one right alternative. Where one has several, the curvature leaves out what makes it
-/// less so, as in expectation maximisation: each step still goes down.
+/// Steps of Newton's method. The cost is convex where each choice has one right alternative. Where one has several, the curvature leaves out the negative part,
+/// the covariance among those, so that steps, halved where they have to be, go down to a local minimum.
 const STEPS: usize = 100;
 
 /// What there was to choose from.
@@ -21,18 +21,30 @@ pub struct Choice {
 }
 
 impl Choice {
-    fn shares(&self, theta: &DVector<f64>) -> Vec<f64> {
-        let scores: Vec<f64> = self.alternatives.iter().map(|x| x.dot(theta)).collect();
-        let most = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let exponentials: Vec<f64> = scores.iter().map(|score| (score - most).exp()).collect();
-        let sum: f64 = exponentials.iter().sum();
-        exponentials.into_iter().map(|share| share / sum).collect()
+    fn scores(&self, theta: &DVector<f64>) -> Vec<f64> {
+        self.alternatives.iter().map(|x| x.dot(theta)).collect()
     }
 
-    /// The share of all that were right.
-    fn of_chosen(&self, shares: &[f64]) -> f64 {
-        self.chosen.iter().map(|place| shares[*place]).sum()
+    fn of_chosen(&self, scores: &[f64]) -> Vec<f64> {
+        self.chosen.iter().map(|place| scores[*place]).collect()
     }
+
+    /// −ln of the probability of all that were right.
+    fn cost(&self, theta: &DVector<f64>) -> f64 {
+        let scores = self.scores(theta);
+        log_sum(&scores) - log_sum(&self.of_chosen(&scores))
+    }
+}
+
+/// ln Σ exp.
+fn log_sum(scores: &[f64]) -> f64 {
+    let most = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    most + scores.iter().map(|score| (score - most).exp()).sum::<f64>().ln()
+}
+
+fn softmax(scores: &[f64]) -> Vec<f64> {
+    let all = log_sum(scores);
+    scores.iter().map(|score| (score - all).exp()).collect()
 }
 
 /// Mean and variance of the normal prior of a component of θ.
@@ -47,7 +59,7 @@ pub fn fit(choices: &[Choice], priors: &[Prior]) -> DVector<f64> {
     let cost = |theta: &DVector<f64>| -> f64 {
         let away = theta - &begin;
         let prior: f64 = away.iter().zip(&precision).map(|(x, precision)| 0.5 * precision * x * x).sum();
-        prior + choices.iter().map(|choice| -choice.weight * choice.of_chosen(&choice.shares(theta)).ln()).sum::<f64>()
+        prior + choices.iter().map(|choice| choice.weight * choice.cost(theta)).sum::<f64>()
     };
     let mut theta = begin.clone();
     let mut now = cost(&theta);
@@ -55,16 +67,16 @@ pub fn fit(choices: &[Choice], priors: &[Prior]) -> DVector<f64> {
         let mut slope = (&theta - &begin).component_mul(&precision);
         let mut curvature = DMatrix::from_diagonal(&precision);
         for choice in choices {
-            let shares = choice.shares(&theta);
+            let scores = choice.scores(&theta);
+            let shares = softmax(&scores);
             let mut mean = DVector::zeros(size);
             for (x, share) in choice.alternatives.iter().zip(&shares) {
                 mean.axpy(*share, x, 1.0);
                 curvature.ger(choice.weight * share, x, x, 1.0);
             }
             slope.axpy(choice.weight, &mean, 1.0);
-            let chosen = choice.of_chosen(&shares);
-            for &place in &choice.chosen {
-                slope.axpy(-choice.weight * shares[place] / chosen, &choice.alternatives[place], 1.0);
+            for (&place, share) in choice.chosen.iter().zip(softmax(&choice.of_chosen(&scores))) {
+                slope.axpy(-choice.weight * share, &choice.alternatives[place], 1.0);
             }
             curvature.ger(-choice.weight, &mean, &mean, 1.0);
         }
@@ -145,11 +157,21 @@ mod tests {
         let slope: f64 = choices
             .iter()
             .map(|choice| {
-                let expected: f64 = choice.alternatives.iter().zip(choice.shares(&found)).map(|(x, p)| p * x[0]).sum();
+                let expected: f64 =
+                    choice.alternatives.iter().zip(softmax(&choice.scores(&found))).map(|(x, p)| p * x[0]).sum();
                 choice.alternatives[choice.chosen[0]][0] - expected
             })
             .sum();
         assert!(found[0] != 0.0 && (slope - found[0] / variance).abs() < 1e-6, "{slope} {found}");
+    }
+
+    #[test]
+    fn what_is_hopeless_has_a_finite_cost() {
+        let alternatives = (0..3).map(|place| 1e4 * unit(3, place)).collect();
+        let choice = Choice { alternatives, chosen: vec![0, 1], weight: 1.0 };
+        assert_eq!(choice.cost(&DVector::from_vec(vec![0.0, 0.0, 1.0])), 1e4 - 2.0_f64.ln());
+        let found = fit(std::slice::from_ref(&choice), &[(0.0, 1.0), (0.0, 1.0), (1.0, 1.0)]);
+        assert!(choice.cost(&found) < 10.0 && found.iter().all(|weight| weight.abs() < 2.0), "{found}");
     }
 
     #[test]

@@ -20,6 +20,8 @@ use crate::plan::{self, Plan};
 const DETECTABLE: f64 = 3.0;
 /// Episodes of a log of our own benchmark, about.
 const OWN_EPISODES: usize = 40;
+/// Largest file of examples, bytes: those of a hundred thousand logs.
+const LARGEST: u64 = 1 << 28;
 /// A camera's delay, s, up to which it is a skew of its clock.
 const SKEW_SECS: f64 = 0.05;
 
@@ -142,8 +144,7 @@ impl Value {
         let end = if truth > self.value { high } else { low };
         match (truth - self.value, end.map(|end| end - self.value)) {
             (0.0, _) | (_, None) => 0.0,
-            // JSON has no infinity.
-            (away, Some(reach)) => (away.abs() / reach.abs()).min(f64::MAX),
+            (away, Some(reach)) => away.abs() / reach.abs(),
         }
     }
 }
@@ -198,8 +199,7 @@ impl Example {
         let compared = self.findings.len();
         let hidden = (0..compared).filter(|&place| self.truth.names(&self.findings[place].effect));
         match self.truth.kind() {
-            Kind::None if self.truth.outside.is_empty() => hidden.chain([compared]).collect(),
-            Kind::None => vec![compared, compared + 1],
+            Kind::None => hidden.chain([compared]).collect(),
             Kind::Effect if self.compares_truth() => hidden.collect(),
             Kind::Effect | Kind::Outside => vec![compared + 1],
         }
@@ -235,7 +235,8 @@ pub fn read(path: &Path, answers: Option<&Path>) -> Result<Vec<Example>> {
 }
 
 fn read_kept(path: &Path) -> Result<Vec<Example>> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let bytes = whole_file::read(path, LARGEST)?;
+    let text = std::str::from_utf8(&bytes).with_context(|| format!("{}: expected text", path.display()))?;
     let of_line = |(number, line): (usize, &str)| {
         serde_json::from_str(line).with_context(|| {
             format!("{}: line {}: expected an example of diagnose-learn --examples", path.display(), number + 1)
@@ -323,7 +324,9 @@ fn example(log: String, truth: Truth, answer: Answer) -> Option<Example> {
         .filter_map(|named| Some((named, truth.effects.iter().find(|effect| effect.name == named.name)?)))
         .flat_map(|(named, effect)| {
             let off = |value: &Value| {
-                effect.parameters.get(&value.key)?.as_f64().map(|truth| value.off(truth) * answer.interval_width)
+                let off = value.off(effect.parameters.get(&value.key)?.as_f64()?);
+                // JSON has no infinity.
+                Some((off * answer.interval_width).min(f64::MAX))
             };
             named.parameters.iter().filter_map(off).collect::<Vec<_>>()
         })
@@ -417,8 +420,8 @@ pub(crate) mod tests {
         let found =
             |effect, none, unknown| Probabilities { effects: vec![("table_tilt".into(), effect)], none, unknown };
         assert!((log.of_right(&found(0.5, 0.3, 0.2)) - 0.8).abs() < 1e-12);
-        log.truth.outside.push("magnet".into());
-        assert_eq!(log.right(), [1, 2]);
+        (log.truth.effects, log.truth.outside) = (Vec::new(), vec!["magnet".into()]);
+        assert_eq!(log.right(), [1]);
         // Nothing is hidden.
         let none = example("a", false, "table_tilt", 10.0);
         assert_eq!(none.right(), [1]);
@@ -446,6 +449,6 @@ pub(crate) mod tests {
         let value = |interval90| Value { key: "slope_x_rad".into(), value: 1.0, interval90 };
         assert_eq!([0.5, 1.0, 2.0].map(|truth| value([Some(0.0), Some(1.5)]).off(truth)), [0.5, 0.0, 2.0]);
         // An end that is none holds everything; an interval that ends at its value nothing beyond.
-        assert_eq!([value([None, Some(2.0)]).off(-9.0), value([Some(1.0), Some(2.0)]).off(0.5)], [0.0, f64::MAX]);
+        assert_eq!([value([None, Some(2.0)]).off(-9.0), value([Some(1.0), Some(2.0)]).off(0.5)], [0.0, f64::INFINITY]);
     }
 }

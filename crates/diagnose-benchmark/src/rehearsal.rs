@@ -8,7 +8,7 @@ use std::sync::Arc;
 use measured_log::{
     Axis, Channel, Episode, Header, Log, Noise, Number, Object, Robot as Arm, Shape, SplitConfig, Table,
 };
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use physics_model::config::WorldConfig;
 use physics_model::rig::{Rig, RigObject, RigShape, RigTool};
 use physics_model::robot::{Robot, ToolShape};
@@ -24,6 +24,9 @@ use crate::recording::{RecordError, Recording};
 const HOLDOUT_FRACTION: f64 = 0.3;
 /// Noise of the sensors at the tool, of which a scenario says nothing: m, N·m.
 const TOOL_NOISE: (f64, f64) = (0.0002, 0.005);
+
+/// No reading counts as farther apart, standard deviations: as for the logs of other engines.
+const MOST: f64 = 1e3;
 
 /// Records the pushes of `actions` on an object that `seed` draws.
 ///
@@ -83,13 +86,23 @@ pub fn difference(log: &Log, other: &Log) -> f64 {
         (Channel::WristTorque, noise.wrist_torque_nm),
     ];
     let (mut sum, mut count) = (0.0, 0.0);
+    let mut add = |apart: Vector3<f64>| {
+        (sum, count) = (sum + apart.map(|one| one.clamp(-MOST, MOST)).norm_squared(), count + 3.0);
+    };
     for (a, b) in log.episodes.iter().zip(&other.episodes) {
         for row in 0..a.rows().min(b.rows()) {
             for (channel, stddev) in vectors {
                 let read = |episode: &Episode| episode.vector(channel, row).map(Vector3::from);
                 if let (Some(a), Some(b), Some(stddev)) = (read(a), read(b), stddev) {
-                    (sum, count) = (sum + (a - b).norm_squared() / (stddev * stddev), count + 3.0);
+                    add((a - b) / stddev);
                 }
+            }
+            let turned = |episode: &Episode| {
+                let [x, y, z, w] = episode.orientation(row)?;
+                Some(UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)))
+            };
+            if let (Some(a), Some(b), Some(stddev)) = (turned(a), turned(b), noise.object_orientation_rad) {
+                add((a * b.inverse()).scaled_axis() / stddev);
             }
         }
     }

@@ -23,9 +23,11 @@ struct World {
     mass: f64,
     length: f64,
     yaw_rad: f64,
+    /// Whether effects are turned with it, as they should be.
+    turns_effects: bool,
 }
 
-const PLAIN: World = World { mass: 1.0, length: 1.0, yaw_rad: 0.0 };
+const PLAIN: World = World { mass: 1.0, length: 1.0, yaw_rad: 0.0, turns_effects: true };
 
 impl World {
     /// What a unit is multiplied by.
@@ -57,7 +59,7 @@ impl World {
             kind.parameters().iter().position(|one| one.name.split('_').any(|part| part == axis.to_string()))
         };
         // The centre of mass is told along the axes of the object.
-        let turns = kind != EffectKind::ComOffset;
+        let turns = kind != EffectKind::ComOffset && self.turns_effects;
         if let (Some(x), Some(y), true) = (along('x'), along('y'), turns) {
             let turned = self.turn() * Vector3::new(values[x], values[y], 0.0);
             (values[x], values[y]) = (turned.x, turned.y);
@@ -67,7 +69,7 @@ impl World {
             EffectKind::HiddenObstacle => values[2] += self.yaw_rad,
             _ => {}
         }
-        scaled.with_parameters(&values).unwrap_or(scaled)
+        scaled.with_parameters(&values).unwrap()
     }
 
     fn play(
@@ -175,6 +177,8 @@ fn of_no_arm() -> impl Iterator<Item = EffectKind> {
 fn with_other_masses_forces_differ_and_nothing_else() {
     for kind in of_no_arm() {
         let Off { worst, does, .. } = off(kind, World { mass: 4.0, ..PLAIN });
+        // A drift of the force shows after minutes.
+        assert!(does > if kind == EffectKind::ForceDrift { 0.05 } else { 0.9 }, "{}: {does}", kind.name());
         // A hand that gives way has a mass of its own.
         let most = if kind == EffectKind::ArmCompliance { 0.3 * does } else { 1e-3 * does };
         assert!(worst <= most, "{}: {worst} of {does}", kind.name());
@@ -200,5 +204,13 @@ fn in_a_frame_that_is_turned_readings_are_turned() {
         // The engine's contacts are not the same in all directions: half of the noise without any effect, more if they are soft.
         let Off { median, does, .. } = off(kind, World { yaw_rad: 2.0, ..PLAIN });
         assert!(median <= 1.0, "{}: {median} of {does}", kind.name());
+    }
+}
+
+#[test]
+fn an_effect_that_is_not_turned_with_its_frame_shows() {
+    for kind in [EffectKind::ConstantForce, EffectKind::ForceBias, EffectKind::PoseOffset, EffectKind::Tether] {
+        let Off { median, .. } = off(kind, World { yaw_rad: 2.0, turns_effects: false, ..PLAIN });
+        assert!(median > 1.0, "{}: {median}", kind.name());
     }
 }

@@ -9,6 +9,7 @@ Seeds 1–99 are for development, those from 500 on for judging.
 """
 
 import argparse
+import concurrent.futures
 import json
 import math
 import multiprocessing
@@ -238,9 +239,11 @@ def main():
         for index in numbers:
             make(options, index)
         return 0
-    # concurrent.futures can hang where a worker ends after its last task (CPython issue 115634).
-    with multiprocessing.get_context("spawn").Pool(2, maxtasksperchild=8) as pool:
-        pool.starmap(make, [(options, index) for index in numbers], chunksize=1)
+    # New workers now and then, as engines keep memory. `max_tasks_per_child` would wait for ever (CPython issue 115634).
+    for first in range(0, len(numbers), 16):
+        batch = numbers[first : first + 16]
+        with concurrent.futures.ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+            list(pool.map(make, [options] * len(batch), batch))
     return 0
 
 

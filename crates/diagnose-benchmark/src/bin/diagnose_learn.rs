@@ -68,6 +68,11 @@ fn run(arguments: &Arguments) -> Result<()> {
     for folder in &arguments.logs {
         examples.extend(read(folder, arguments.answers.as_deref())?);
     }
+    let mut logs: Vec<&str> = examples.iter().map(|example| &*example.log).collect();
+    logs.sort_unstable();
+    if let Some(twice) = logs.windows(2).find(|pair| pair[0] == pair[1]) {
+        bail!("{} is there twice: expected each log once, in a folder or in a file of examples", twice[0]);
+    }
     let mut engines: Vec<String> = examples.iter().map(|example| example.truth.engine.clone()).collect();
     engines.sort_unstable();
     engines.dedup();
@@ -196,6 +201,7 @@ fn provenance(examples: &[Example], earlier: Option<&Decision>) -> serde_json::V
     }
     sets.sort();
     let mut folders: Vec<&str> = examples.iter().filter_map(|example| Some(example.log.split_once('/')?.0)).collect();
+    folders.sort_unstable();
     folders.dedup();
     let sets: Vec<_> = (sets.iter())
         .map(|(engine, seed, logs)| serde_json::json!({ "engine": engine, "seed": seed, "logs": logs }))
@@ -203,7 +209,6 @@ fn provenance(examples: &[Example], earlier: Option<&Decision>) -> serde_json::V
     let mut provenance = serde_json::json!({
         "command": "diagnose-learn",
         "version": env!("CARGO_PKG_VERSION"),
-        "generator": "tests/peers/worlds/make_logs.py",
         "folders": folders,
         "sets": sets,
         "logs": examples.len(),

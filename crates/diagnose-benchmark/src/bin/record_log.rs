@@ -38,7 +38,7 @@ struct Arguments {
     /// Folder of the log; it must not hold one yet.
     #[arg(long)]
     out: PathBuf,
-    /// File for what the log hides, as diagnose-learn reads it: TRUTH/log-000.json of a log in FOLDER/log-000, where TRUTH is FOLDER/truth.
+    /// File for what the log hides, as diagnose-learn reads it: FOLDER/truth/log-000.json of a log in FOLDER/log-000.
     #[arg(long)]
     truth: Option<PathBuf>,
     /// Project folder [default: the nearest one above with scenarios/base.toml].
@@ -70,7 +70,16 @@ fn run(arguments: &Arguments) -> Result<()> {
         bail!("{}: exists without log.toml beside it: choose another --out", model_file.display());
     }
     if let Some(truth) = &arguments.truth {
-        whole_file::check_own(truth, "what a log hides", |text| serde_json::from_str::<Truth>(text).is_ok())?;
+        if truth.exists() || truth.starts_with(&arguments.out) {
+            bail!("--truth {}: expected a file that is not there, outside of the log", truth.display());
+        }
+        let known = &problem.scenario.effects;
+        if let Some(effect) = known.model.iter().find(|effect| !known.truth.contains(effect)) {
+            bail!(
+                "--truth: effects.model has {}, expected it in effects.truth with the same values",
+                effect.kind().name()
+            );
+        }
     }
     let log = record(&problem, arguments.actions, Seed(arguments.seed))?;
     let truth = (arguments.truth.as_ref())
@@ -85,7 +94,7 @@ fn run(arguments: &Arguments) -> Result<()> {
     whole_file::write(&model_file, model.as_bytes(), Existing::Replace).map_err(program::failed)?;
     if let Some((path, truth)) = truth {
         let text = serde_json::to_string_pretty(&truth)? + "\n";
-        whole_file::write(path, text.as_bytes(), Existing::Replace).map_err(program::failed)?;
+        whole_file::write(path, text.as_bytes(), Existing::Keep).map_err(program::failed)?;
     }
     let rows: usize = log.episodes.iter().map(Episode::rows).sum();
     program::out!("{}: {} episodes, {rows} rows", arguments.out.display(), log.episodes.len());
