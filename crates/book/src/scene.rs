@@ -60,7 +60,7 @@ impl Scene {
             Self::Arm => RigTool::Arm(Arc::clone(robot)),
             _ => RigTool::Ball { radius_m: BALL_M },
         };
-        let rig = Rig { world: world(table_m), tick_steps: TICK_STEPS, tool, tool_slip_mps: 0.0 };
+        let rig = Rig { world: world(table_m), tick_steps: TICK_STEPS, tool, tool_slip_mps: 0.0, cone_exponent: 1.0 };
         let (shape, size_m) = match self {
             Self::Roll => (ObjectShape::Sphere, [SPHERE_M, 0.0, 0.0]),
             _ => (ObjectShape::Box, BOX_M),

@@ -241,6 +241,7 @@ pub fn generate_part(spec: &SetSpec, root: Option<&Path>, count: usize) -> Resul
         tick_steps: refinement,
         tool,
         tool_slip_mps: 0.0,
+        cone_exponent: 1.0,
     };
     let [mass, friction] = spec.nominal_errors;
     let shape = RigShape::Solid { shape: spec.shape, size_m: spec.size_m() };

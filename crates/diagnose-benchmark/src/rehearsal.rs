@@ -66,6 +66,7 @@ pub fn record(problem: &Problem, actions: Actions, seed: Seed) -> Result<Log, Re
             tick_steps: 1,
             tool: RigTool::Arm(Arc::new(problem.truth.robot().clone())),
             tool_slip_mps: 0.0,
+            cone_exponent: 1.0,
         },
         object: RigObject::new(shape, object.mass_kg, object.friction),
         effects: scenario.effects.truth.iter().map(EffectConfig::build).collect(),

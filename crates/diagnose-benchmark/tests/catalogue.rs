@@ -94,8 +94,13 @@ impl World {
             restitution: 0.0,
             obstacle_mobility: ObstacleMobility::Movable,
         };
-        let rig =
-            Rig { world, tick_steps: 2, tool: RigTool::Ball { radius_m: self.length * TOOL_M }, tool_slip_mps: 0.0 };
+        let rig = Rig {
+            world,
+            tick_steps: 2,
+            tool: RigTool::Ball { radius_m: self.length * TOOL_M },
+            tool_slip_mps: 0.0,
+            cone_exponent: 1.0,
+        };
         let object = RigObject {
             added_mass_kg: self.mass * script.added_mass_kg,
             ..RigObject::new(RigShape::Solid { shape, size_m }, self.mass * MASS_KG, FRICTION)

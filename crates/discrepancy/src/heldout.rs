@@ -66,7 +66,7 @@ pub fn retuned(log: &Log, nominal: &Nominal, seed: u64) -> Nominal {
     let found = fit(&study, model, Begin::at(&x), Effort::Full);
     let mut retuned = nominal.clone();
     for (tunable, z) in retuned.tunables.iter_mut().zip(&found.x) {
-        tunable.mean = tunable.value(*z);
+        tunable.set(tunable.value(*z));
     }
     retuned
 }

@@ -71,6 +71,7 @@ pub mod report;
 pub mod rival;
 pub mod screen;
 mod search;
+mod sentences;
 pub mod separate;
 pub mod simulator;
 pub mod split;

@@ -158,7 +158,7 @@ impl ModelFile {
         let mut applied = nominal.clone();
         applied.effects.clone_from(&self.effects.model);
         for tunable in &mut applied.tunables {
-            tunable.mean = self.nominal.get(&tunable.key).copied().unwrap_or(tunable.mean);
+            tunable.set(self.nominal.get(&tunable.key).copied().unwrap_or(tunable.mean));
         }
         applied
     }
@@ -180,7 +180,7 @@ impl ModelFile {
                 let reason = format!("key `nominal.{key}`: expected more than 0, found {value}");
                 return Err(Error::Model { reason });
             }
-            tunable.mean = *value;
+            tunable.set(*value);
         }
         nominal.effects.extend(self.effects.model.iter().cloned());
         Ok(())

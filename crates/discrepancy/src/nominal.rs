@@ -37,7 +37,10 @@ const THROWN_DAMPING_RATIO: f64 = 1.0;
 /// ours by about as much, those of Bullet and of real tables stiffer.
 const CONTACT_SPREAD: f64 = 0.7;
 
-/// How far contacts reach, in these: beyond a factor of eight no contact is one.
+/// The same of the exponent of the cone of friction: real friction is Coulomb's, and an engine's pyramid has an exponent of 10 or of 0.1.
+const CONE_SPREAD: f64 = 1.0;
+
+/// How far contacts reach, in these: beyond a factor of eight no contact is one, and beyond one of 20 all pyramids are alike.
 const CONTACT_RANGE: f64 = 3.0;
 
 /// How exactly the engine solves. Variants of it show how far its answers can be trusted.
@@ -91,6 +94,14 @@ impl Tunable {
         if self.positive { self.mean * (z * self.stddev / self.mean).exp() } else { self.mean + z * self.stddev }
     }
 
+    /// Makes `value` the mean. What no log says stays known to the same factor; the spread of what one says is its own.
+    pub(crate) fn set(&mut self, value: f64) {
+        if matches!(self.place, Place::ContactFrequency | Place::ContactDamping | Place::Cone) {
+            self.stddev *= value / self.mean;
+        }
+        self.mean = value;
+    }
+
     /// Whether it can have a value: what is scaled is above 0.
     pub(crate) fn takes(&self, value: f64) -> bool {
         value.is_finite() && (!self.positive || value > 0.0)
@@ -119,13 +130,14 @@ enum Place {
     Restitution,
     Clock(Clock),
     ContactFrequency,
+    Cone,
     ContactDamping,
 }
 
 impl Place {
     fn unit(self) -> &'static str {
         match self {
-            Self::TableFriction | Self::ToolFriction | Self::Restitution | Self::ContactDamping => "",
+            Self::TableFriction | Self::ToolFriction | Self::Restitution | Self::ContactDamping | Self::Cone => "",
             Self::ContactFrequency => "Hz",
             Self::Clock(_) => "s",
             Self::TableHeight | Self::Com(_) | Self::Size(_) => "m",
@@ -237,19 +249,23 @@ impl Nominal {
     }
 
     /// How stiff contacts are, and how much they damp: no log says it, and engines differ by factors.
-    fn contact(&self) -> [Tunable; 2] {
+    fn contact(&self) -> Vec<Tunable> {
         let engine = self.engine();
-        let tunable = |key: &str, mean: f64, place| Tunable {
+        let tunable = |key: &str, mean: f64, spread: f64, place| Tunable {
             key: key.into(),
             mean,
-            stddev: CONTACT_SPREAD * mean,
+            stddev: spread * mean,
             positive: true,
             place,
         };
-        [
-            tunable("contact.frequency_hz", engine.contact_frequency_hz, Place::ContactFrequency),
-            tunable("contact.damping_ratio", engine.contact_damping_ratio, Place::ContactDamping),
-        ]
+        let mut all = vec![
+            tunable("contact.frequency_hz", engine.contact_frequency_hz, CONTACT_SPREAD, Place::ContactFrequency),
+            tunable("contact.damping_ratio", engine.contact_damping_ratio, CONTACT_SPREAD, Place::ContactDamping),
+        ];
+        if self.has_tool() && !self.rolls() {
+            all.push(tunable("contact.cone_exponent", 1.0, CONE_SPREAD, Place::Cone));
+        }
+        all
     }
 
     /// The log's header.
@@ -364,6 +380,7 @@ impl Nominal {
         let plain = self.engine();
         let frequency = self.factor(z, Place::ContactFrequency, plain.contact_frequency_hz);
         let damping = self.factor(z, Place::ContactDamping, plain.contact_damping_ratio);
+        let cone_exponent = self.factor(z, Place::Cone, 1.0);
         let world = WorldConfig {
             control_period_secs: header.period_secs / f64::from(steps),
             control_steps: 1,
@@ -378,7 +395,7 @@ impl Nominal {
             restitution: 0.0,
             obstacle_mobility: ObstacleMobility::Movable,
         };
-        Rig { world, tick_steps: steps, tool: self.tool.clone(), tool_slip_mps: engine.tool_slip_mps }
+        Rig { world, tick_steps: steps, tool: self.tool.clone(), tool_slip_mps: engine.tool_slip_mps, cone_exponent }
     }
 
     /// The rig at its means, as files of other simulators take it.
@@ -470,7 +487,8 @@ pub(crate) mod tests {
         let engine = nominal.engine();
         assert_eq!(nominal.rig(&z, &engine).world.contact_frequency_hz, engine.contact_frequency_hz);
         let contact = nominal.tunables.iter_mut().find(|tunable| tunable.key == "contact.frequency_hz").unwrap();
-        contact.mean = 120.0;
+        contact.set(120.0);
+        assert!((contact.value(1.0) / 120.0 - CONTACT_SPREAD.exp()).abs() < 1e-9);
         assert!((nominal.rig(&z, &engine).world.contact_frequency_hz - 120.0).abs() < 1e-9);
         let stiffer = Engine { contact_frequency_hz: 2.0 * engine.contact_frequency_hz, ..engine };
         assert!((nominal.rig(&z, &stiffer).world.contact_frequency_hz - 240.0).abs() < 1e-9);

@@ -175,12 +175,8 @@ pub struct Report {
     pub seconds: f64,
 }
 
-/// Contacts that differ by less than this factor in their natural frequency are the model's.
-const FACTOR: f64 = 1.5;
 /// A reading that lowers the held-out error to this share is how the log is meant.
 const MENDS: f64 = 0.7;
-/// A number of the log that is this many standard deviations from its mean is wrong, or its spread is.
-const FAR: f64 = 4.0;
 
 impl Report {
     /// Which noise was used.
@@ -188,58 +184,6 @@ impl Report {
     pub fn noise_sentence(&self) -> String {
         let sentences: Vec<String> = self.noise.iter().map(SensorNoise::sentence).collect();
         format!("Noise: {}.", sentences.join("; "))
-    }
-
-    /// What re-tuning found of clocks and contacts, and which numbers of the log it left far behind.
-    #[must_use]
-    pub fn retuned_sentences(&self) -> Vec<String> {
-        [self.clock_sentences(), self.contact_sentence().into_iter().collect(), self.far_sentences()].concat()
-    }
-
-    /// How contacts differ from the model's, if they do by a factor.
-    fn contact_sentence(&self) -> Option<String> {
-        let value = self.retuned.iter().find(|value| value.key == "contact.frequency_hz")?;
-        let ([low, high], nominal) = (value.interval90, value.prior[0]);
-        let ratio = value.value / nominal;
-        let than = if ratio > 1.0 { "stiffer" } else { "softer" };
-        let clear = ratio.ln().abs() > FACTOR.ln() && (low > nominal || high < nominal);
-        (clear && [ratio, low, high].iter().all(|value| value.is_finite())).then(|| {
-            format!(
-                "Contacts are {than} than the model's: their natural frequency is {:.0} Hz instead of {nominal:.0} (90 %: {low:.0} to {high:.0} Hz); \
-                 re-tuned, no effect.",
-                value.value
-            )
-        })
-    }
-
-    /// Numbers of the log that re-tuning has moved beyond what their spread allows.
-    fn far_sentences(&self) -> Vec<String> {
-        let own = |value: &&Retuned| !value.key.starts_with("clock.") && !value.key.starts_with("contact.");
-        let far = |value: &Retuned| {
-            let [mean, stddev] = value.prior;
-            let by = (value.value - mean).abs() / stddev;
-            (by > FAR && by.is_finite() && mean.is_finite()).then(|| {
-                format!(
-                    "Re-tuning has moved {} to {:.3}, {by:.0} standard deviations from the {mean:.3} of log.toml: check it.",
-                    value.key, value.value
-                )
-            })
-        };
-        self.retuned.iter().filter(own).filter_map(far).collect()
-    }
-
-    /// Which clocks differ from the tool's by more than their intervals, and than clocks do.
-    fn clock_sentences(&self) -> Vec<String> {
-        let clock = |value: &Retuned| {
-            let whose = value.key.strip_prefix("clock.")?.strip_suffix("_secs")?;
-            let [low, high] = value.interval90;
-            let late = if value.value > 0.0 { "late" } else { "early" };
-            (low * high > 0.0 && value.value.abs() > 0.5 * value.prior[1]).then(|| {
-                let [ms, low, high] = [value.value, low, high].map(|secs| 1e3 * secs);
-                format!("The clock of the {whose} is {:.1} ms {late} against the tool's (90 %: {low:.1} to {high:.1} ms); re-tuned, no effect.", ms.abs())
-            })
-        };
-        self.retuned.iter().filter_map(clock).collect()
     }
 
     /// Which episodes were left out, if any.

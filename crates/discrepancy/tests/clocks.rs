@@ -1,4 +1,4 @@
-//! Clocks that differ, stamps off the grid, and columns that are missing: of recorded logs with a tilt, damping or nothing.
+//! Clocks that differ, stamps off the grid, and columns that are missing: of recorded logs with a tilt, a grain, damping or nothing.
 
 use std::path::Path;
 
@@ -79,10 +79,11 @@ fn a_late_force_has_its_own_name() {
 
 #[test]
 fn what_the_stamps_say_is_the_tick() {
-    let mut stretched = log("set-003");
+    let mut stretched = log("set-005");
     stretched.episodes.iter_mut().for_each(|episode| episode.time_secs.iter_mut().for_each(|time| *time *= 1.01));
     let found = report(&stretched);
-    assert_eq!(names(&found), ["table_tilt"], "{}", found.summary);
+    // One without a twin: between a tilt and a constant force 1 % of the time decides.
+    assert_eq!(names(&found), ["anisotropic_friction"], "{}", found.summary);
     assert!(found.heldout.after < 1.1, "{:?}", found.heldout);
 }
 

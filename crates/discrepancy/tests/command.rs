@@ -15,11 +15,11 @@ fn diagnose(measured: &Path, out: &Path) -> Output {
 }
 
 /// A copy of a recorded set in which a line of a file is changed.
-fn changed(folder: &Path, file: &str, change: impl Fn(&str) -> String) -> PathBuf {
+fn changed(folder: &Path, (set, file): (&str, &str), change: impl Fn(&str) -> String) -> PathBuf {
     let copy = folder.join("log");
     std::fs::create_dir(&copy).unwrap();
     for name in ["log.toml", "samples.csv"] {
-        let text = std::fs::read_to_string(root().join("tests/data/mujoco-logs/logs/set-002").join(name)).unwrap();
+        let text = std::fs::read_to_string(root().join("tests/data/mujoco-logs/logs").join(set).join(name)).unwrap();
         let text = if name == file { change(&text) } else { text };
         std::fs::write(copy.join(name), text).unwrap();
     }
@@ -28,16 +28,11 @@ fn changed(folder: &Path, file: &str, change: impl Fn(&str) -> String) -> PathBu
 
 /// A copy of a recorded set with so many of its episodes, which are numbered.
 fn first_episodes(folder: &Path, set: &str, episodes: usize) -> PathBuf {
-    let (from, copy) = (root().join("tests/data/mujoco-logs/logs").join(set), folder.join("log"));
-    std::fs::create_dir(&copy).unwrap();
-    std::fs::copy(from.join("log.toml"), copy.join("log.toml")).unwrap();
-    let samples = std::fs::read_to_string(from.join("samples.csv")).unwrap();
-    let kept = samples.lines().filter(|line| {
-        let id = line.split(',').next().and_then(|id| id.parse::<usize>().ok());
-        id.is_none_or(|id| id < episodes)
-    });
-    std::fs::write(copy.join("samples.csv"), kept.flat_map(|line| [line, "\n"]).collect::<String>()).unwrap();
-    copy
+    let kept =
+        |line: &&str| line.split(',').next().and_then(|id| id.parse::<usize>().ok()).is_none_or(|id| id < episodes);
+    changed(folder, (set, "samples.csv"), |samples| {
+        samples.lines().filter(kept).flat_map(|line| [line, "\n"]).collect()
+    })
 }
 
 #[test]
@@ -148,7 +143,7 @@ fn numbers_that_cannot_be_meant_are_refused_before_anything_is_simulated() {
     for (file, change, expected) in cases {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("deep/out");
-        let output = diagnose(&changed(folder.path(), file, change), &out);
+        let output = diagnose(&changed(folder.path(), ("set-002", file), change), &out);
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{message}");
         assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{message}");
@@ -242,7 +237,7 @@ fn a_broken_log_ends_with_code_2_one_sentence_and_nothing_written() {
     for (file, change, expected) in cases {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("out");
-        let output = diagnose(&changed(folder.path(), file, change), &out);
+        let output = diagnose(&changed(folder.path(), ("set-002", file), change), &out);
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{message}");
         assert!(message.starts_with("error: ") && message.trim_end().lines().count() == 1, "{message}");

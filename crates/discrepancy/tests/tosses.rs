@@ -36,7 +36,7 @@ fn rig() -> Rig {
         restitution: 0.0,
         obstacle_mobility: ObstacleMobility::Fixed,
     };
-    Rig { world, tick_steps: steps, tool: RigTool::None, tool_slip_mps: 0.0 }
+    Rig { world, tick_steps: steps, tool: RigTool::None, tool_slip_mps: 0.0, cone_exponent: 1.0 }
 }
 
 fn header() -> Header {

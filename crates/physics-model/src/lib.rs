@@ -49,7 +49,7 @@
 //!     restitution: 0.0,
 //!     obstacle_mobility: ObstacleMobility::Movable,
 //! };
-//! let rig = Rig { world, tick_steps: 10, tool: RigTool::None, tool_slip_mps: 0.0 };
+//! let rig = Rig { world, tick_steps: 10, tool: RigTool::None, tool_slip_mps: 0.0, cone_exponent: 1.0 };
 //! let (mass_kg, friction) = (0.5, 0.4);
 //! let shape = RigShape::Solid { shape: ObjectShape::Box, size_m: [0.08, 0.06, 0.05] };
 //! let start = BodyState {

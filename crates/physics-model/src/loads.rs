@@ -10,7 +10,7 @@ use rapier3d::prelude::{
 use crate::bodies::Body;
 use crate::config::WorldConfig;
 use crate::effect::{BodyView, Effects, Hooks, Load, Surroundings, TableContact};
-use crate::friction::OpposeSlip;
+use crate::friction::{by_cone, oppose};
 use crate::theta::ObjectShape;
 use crate::world::{Wrench, array, vector};
 
@@ -122,6 +122,8 @@ pub(crate) struct RigFriction {
     pub(crate) fall_mps: f32,
     /// Slip below which friction of that pair is in proportion to it, m/s; 0: never.
     pub(crate) slip_mps: f32,
+    /// Shape of the cone of friction on the table (see [`by_cone`]); 1: Coulomb's.
+    pub(crate) exponent: f32,
 }
 
 impl RigFriction {
@@ -172,7 +174,8 @@ impl PhysicsHooks for ContactFriction<'_> {
             _ => None,
         };
         let body = body.and_then(|handle| context.bodies.get(handle)).filter(|body| body.is_dynamic());
-        if self.effects.hooks.contains(Hooks::FRICTION)
+        let exponent = self.rig.filter(|_| body.is_some()).map_or(1.0, |rig| rig.exponent);
+        if (self.effects.hooks.contains(Hooks::FRICTION) || exponent != 1.0)
             && let Some(body) = body
             && let Some(manifold) = context.rigid_mut()
             && !manifold.solver_contacts.is_empty()
@@ -182,12 +185,17 @@ impl PhysicsHooks for ContactFriction<'_> {
                 let velocity = body.velocity_at_point(point);
                 let slip = velocity - normal * velocity.dot(normal);
                 let contact = TableContact { position_m: array(point), slip_mps: array(slip) };
-                self.effects.list.iter().map(|effect| effect.friction(&contact)).product::<f64>()
+                let cone = if exponent == 1.0 || slip.length_squared() < 1e-12 {
+                    1.0
+                } else {
+                    by_cone(slip, exponent).length()
+                };
+                f64::from(cone) * self.effects.list.iter().map(|effect| effect.friction(&contact)).product::<f64>()
             };
             // The engine has one coefficient for all points of two shapes.
             let sum: f64 = manifold.solver_contacts.iter().map(|c| factor((c.anchor1 + c.anchor2) * 0.5)).sum();
             *manifold.friction *= (sum / manifold.solver_contacts.len() as f64) as f32;
         }
-        OpposeSlip.modify_solver_contacts(context);
+        oppose(context, exponent);
     }
 }

@@ -154,14 +154,15 @@ impl<'a> World<'a> {
             coefficient: world.config.tool_friction as f32,
             fall_mps: fall_mps as f32,
             slip_mps: 0.0,
+            exponent: 1.0,
         });
         world
     }
 
-    /// The same with a tool that lets go of what slips less than this, see [`crate::rig::Rig::tool_slip_mps`].
-    pub(crate) fn letting_go(mut self, tool_slip_mps: f64) -> Self {
+    /// The same with the friction of a rig, see [`crate::rig::Rig::tool_slip_mps`] and [`crate::rig::Rig::cone_exponent`].
+    pub(crate) fn sliding(mut self, tool_slip_mps: f64, cone_exponent: f64) -> Self {
         if let Some(friction) = &mut self.rig_friction {
-            friction.slip_mps = tool_slip_mps as f32;
+            (friction.slip_mps, friction.exponent) = (tool_slip_mps as f32, cone_exponent as f32);
         }
         self
     }

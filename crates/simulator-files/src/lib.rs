@@ -28,7 +28,7 @@
 //! let shape = RigShape::Solid { shape: ObjectShape::Box, size_m: [0.08, 0.06, 0.05] };
 //! let scene = Scene {
 //!     name: "push",
-//!     rig: Rig { world, tick_steps: 1, tool: RigTool::Ball { radius_m: 0.02 }, tool_slip_mps: 0.0 },
+//!     rig: Rig { world, tick_steps: 1, tool: RigTool::Ball { radius_m: 0.02 }, tool_slip_mps: 0.0, cone_exponent: 1.0 },
 //!     object: RigObject::new(shape, 0.5, 0.3),
 //!     effects: vec![
 //!         EffectConfig::TableTilt(TableTilt { slope_x_rad: 0.02, slope_y_rad: 0.0 }),

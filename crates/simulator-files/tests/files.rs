@@ -32,7 +32,8 @@ fn scene(object: RigObject, effects: Vec<EffectConfig>) -> Scene<'static> {
         restitution: 0.0,
         obstacle_mobility: ObstacleMobility::Movable,
     };
-    let rig = Rig { world, tick_steps: 1, tool: RigTool::Ball { radius_m: 0.02 }, tool_slip_mps: 0.0 };
+    let rig =
+        Rig { world, tick_steps: 1, tool: RigTool::Ball { radius_m: 0.02 }, tool_slip_mps: 0.0, cone_exponent: 1.0 };
     Scene { name: "a log -- of --- mine", rig, object, effects }
 }
 

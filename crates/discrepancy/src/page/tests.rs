@@ -313,3 +313,16 @@ fn the_page_of_one_held_out_episode_shows_it() {
     assert!(html.contains("episode 42"));
     check_numbers(&html);
 }
+
+#[test]
+fn a_pyramid_of_friction_is_told_where_it_is_sure() {
+    let said = |value: f64, interval90: [f64; 2]| {
+        let mut report = report(Verdict::None);
+        report.retuned[0] = Retuned { key: "contact.cone_exponent".into(), prior: [1.0, 1.0], value, interval90 };
+        report.retuned_sentences().concat()
+    };
+    assert!(said(8.0, [4.0, 15.0]).contains("it is less between these axes (exponent 8.00"));
+    assert!(said(0.1, [0.05, 0.3]).contains("it is more between these axes"));
+    // Near Coulomb's cone, or as likely that.
+    assert!(said(1.5, [1.2, 1.9]).is_empty() && said(4.0, [0.8, 20.0]).is_empty());
+}

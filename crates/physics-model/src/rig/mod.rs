@@ -58,6 +58,9 @@ pub struct Rig {
     /// Slip, m/s, below which the friction of tool and object is in proportion to it, so that it lets go of what does not slip; 0: Coulomb's, which
     /// sticks.
     pub tool_slip_mps: f64,
+    /// Shape of the cone of friction on the table: 1 is Coulomb's; above, a pyramid with its edges on x and y, whose friction is less between them; below, one
+    /// with its faces across them, whose friction is more. Engines that solve friction by axes have such pyramids.
+    pub cone_exponent: f64,
 }
 
 /// What moves by command.

@@ -126,7 +126,7 @@ impl<'a> Run<'a> {
         let place = ToolPose { position_m: if hangs { measured_m } else { sent_m }, orientation };
         check_place(place.position_m)?;
         let world = World::restore_rig(&config, effects.list, &theta, object.beyond(), &body, &place, shapes)
-            .letting_go(rig.tool_slip_mps)
+            .sliding(rig.tool_slip_mps, rig.cone_exponent)
             .later(time_secs, start.hidden)
             .deflected_from(sent_m);
         motion.shift_to(place.position_m);

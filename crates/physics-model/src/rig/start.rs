@@ -66,6 +66,9 @@ impl Rig {
         if !(0.0..=1.0).contains(&self.tool_slip_mps) {
             return refuse("tool_slip_mps", "0 to 1 m/s");
         }
+        if !(0.01..=100.0).contains(&self.cone_exponent) {
+            return refuse("cone_exponent", "0.01 to 100");
+        }
         if let RigTool::Ball { radius_m } = self.tool
             && !(1e-4..=10.0).contains(&radius_m)
         {

@@ -22,5 +22,5 @@ pub(crate) fn rig(tool: RigTool) -> Rig {
         restitution: 0.0,
         obstacle_mobility: ObstacleMobility::Fixed,
     };
-    Rig { world, tick_steps: 2, tool, tool_slip_mps: 0.0 }
+    Rig { world, tick_steps: 2, tool, tool_slip_mps: 0.0, cone_exponent: 1.0 }
 }
