@@ -46,7 +46,7 @@ enum Verb {
     /// Makes a recording of an episode for the Rerun viewer; its first build takes long.
     #[command(
         disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask rerun runs/demo/D4-sawyer-surmise-mixture-seed-1-trial-0"
+        after_help = "Examples:\n  cargo xtask rerun runs/demo/D4-sawyer-surmise-mixture"
     )]
     Rerun(Rest),
     /// Turns a recording or published measurements into a log that can be diagnosed.

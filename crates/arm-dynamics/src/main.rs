@@ -30,7 +30,7 @@ enum Verb {
         #[arg(long)]
         tip: Option<String>,
         /// Positions of the joints, rad or m, separated by commas [default: 0, or the middle of the limits where 0 is outside].
-        #[arg(long, value_delimiter = ',', allow_negative_numbers = true)]
+        #[arg(long, value_delimiter = ',', allow_hyphen_values = true)]
         at: Option<Vec<f64>>,
         /// Prints the same as JSON.
         #[arg(long)]

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, anyhow, ensure};
 use discrepancy::decision::Probabilities;
 use discrepancy::{are_twins_by_name, findings::Findings};
 use physics_model::EffectConfig;
@@ -226,6 +226,7 @@ pub fn read(path: &Path, answers: Option<&Path>) -> Result<Vec<Example>> {
     if path.is_file() {
         return read_kept(path);
     }
+    ensure!(path.is_dir(), "{}: expected a folder of logs or a file of examples, found no such thing", path.display());
     if path.join("plan.json").exists() {
         return read_own(path);
     }
@@ -238,8 +239,8 @@ fn read_kept(path: &Path) -> Result<Vec<Example>> {
     let bytes = whole_file::read(path, LARGEST)?;
     let text = std::str::from_utf8(&bytes).with_context(|| format!("{}: expected text", path.display()))?;
     let of_line = |(number, line): (usize, &str)| {
-        serde_json::from_str(line).with_context(|| {
-            format!("{}: line {}: expected an example of diagnose-learn --examples", path.display(), number + 1)
+        serde_json::from_str(line).map_err(|_| {
+            anyhow!("{}: line {}: expected an example of diagnose-learn --examples", path.display(), number + 1)
         })
     };
     text.lines().enumerate().map(of_line).collect()

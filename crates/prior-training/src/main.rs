@@ -60,7 +60,7 @@ struct Arguments {
     /// Fails unless there is an interrupted training to continue. Without this option one is continued where there is one.
     #[arg(long)]
     resume: bool,
-    /// Project folder [default: the current one].
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
     #[arg(long)]
     root: Option<PathBuf>,
 }

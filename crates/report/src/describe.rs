@@ -46,7 +46,7 @@ pub fn summary(trace: &EpisodeTrace, record: &TrialRecord) -> String {
     let end = if trace.success { "reached the goal" } else { "did not reach the goal" };
     let why = if trace.success { String::new() } else { format!(" ({})", trace.reason) };
     let mut out = format!(
-        "\n{end}{why} after {} actions in {:.0} s: {:.2} s a decision, {}\n",
+        "\n{end}{why} after {} actions in {:.0} s: {:.2} s for each update and search, {}\n",
         record.steps,
         record.seconds,
         record.decision_seconds / record.steps.max(1) as f64,

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context as _, Result, ensure};
+use anyhow::{Context as _, Result, bail, ensure};
 use serde_json::{Map, Value, json};
 use whole_file::Existing;
 
@@ -27,7 +27,7 @@ impl Results {
     ///
     /// # Errors
     ///
-    /// Where the folder cannot be made.
+    /// Where the folder cannot be made, and for a file in it that is no result of this command.
     pub fn open(folder: &Path, commit: String) -> Result<Self> {
         std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
         // A table is never without the numbers that it is of.
@@ -37,7 +37,16 @@ impl Results {
             "{}: exists without {NAME}.json beside it: choose another folder",
             table.display()
         );
-        Ok(Self { folder: folder.to_path_buf(), commit })
+        let results = Self { folder: folder.to_path_buf(), commit };
+        // Before anything is played: rows are added to these.
+        results.whole()?;
+        Ok(results)
+    }
+
+    /// All rows so far.
+    fn whole(&self) -> Result<Map<String, Value>> {
+        let path = self.path(NAME);
+        if path.exists() { object(&path) } else { Ok(Map::new()) }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -54,9 +63,7 @@ impl Results {
         if !path.exists() {
             return Ok(None);
         }
-        let bytes = whole_file::read(&path, MOST_BYTES)?;
-        let value: Value = serde_json::from_slice(&bytes)
-            .with_context(|| format!("{} is no result of this benchmark: move it away", path.display()))?;
+        let value = Value::Object(object(&path)?);
         let same = value["task"] == row.task();
         ensure!(same, "{} has a row of other options, episodes or seed: choose another folder", path.display());
         Ok(Some(value))
@@ -82,18 +89,21 @@ impl Results {
     pub(super) fn finish(&self, result: &Value) -> Result<()> {
         let mut all: Map<String, Value> = result.as_object().cloned().unwrap_or_default();
         let whole = self.path(NAME);
-        if whole.exists() {
-            let before = whole_file::read(&whole, MOST_BYTES)?;
-            let before: Value = serde_json::from_slice(&before)
-                .with_context(|| format!("{} is no result of this benchmark: move it away", whole.display()))?;
-            for (name, row) in before.as_object().into_iter().flatten() {
-                all.entry(name).or_insert_with(|| row.clone());
-            }
+        for (name, row) in self.whole()? {
+            all.entry(name).or_insert(row);
         }
         let all = Value::Object(all);
         whole_file::write(&whole, &pretty(&all)?, Existing::Replace)?;
         whole_file::write(&whole.with_extension("md"), table(&all).as_bytes(), Existing::Replace)?;
         Ok(())
+    }
+}
+
+/// A file of this command.
+fn object(path: &Path) -> Result<Map<String, Value>> {
+    match serde_json::from_slice(&whole_file::read(path, MOST_BYTES)?) {
+        Ok(Value::Object(found)) => Ok(found),
+        _ => bail!("{} is no result of this benchmark: move it away", path.display()),
     }
 }
 

@@ -44,7 +44,7 @@ struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask diagnose-learn runs/worlds/mujoco-all-seed11 runs/worlds/bullet-all-seed11 --answers runs/answers --table runs/table
-  cargo xtask diagnose-learn assets/diagnose/examples.jsonl --out runs/decision.json
+  cargo xtask diagnose-learn assets/results/diagnose-worlds/seeds-51-52-91.jsonl --out runs/decision.json
   cargo xtask diagnose-learn runs/worlds/mujoco-all-seed501 --answers runs/answers --unseen assets/diagnose/decision.json";
 
 /// The table.

@@ -37,15 +37,15 @@ struct Arguments {
     /// Prints the report as one JSON object.
     #[arg(long)]
     json: bool,
-    /// Project folder [default: the current one].
+    /// Project folder [default: the nearest one above with scenarios/base.toml].
     #[arg(long)]
     root: Option<PathBuf>,
 }
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask datagen --seed 2 --out runs/held-out/sawyer
-  cargo xtask calibrate --out runs/calibration/sawyer";
+  cargo xtask calibrate --out runs/calibration/sawyer
+  cargo xtask datagen --seed 2 --out runs/held-out/sawyer";
 
 /// The report.
 const REPORT: &str = "calibration.json";
