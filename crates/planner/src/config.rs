@@ -57,7 +57,7 @@ pub struct Config {
     pub depth: usize,
     /// Length of the rollout below a new leaf.
     pub rollout_depth: RolloutDepth,
-    /// What [`pomdp::Policy::priors`] is asked for.
+    /// What [the policy of the problem](pomdp::Policy::priors) says of the actions of a new node.
     pub action_priors: ActionPriors,
     /// How observations branch the tree.
     pub observations: Observations,
@@ -68,7 +68,7 @@ pub struct Config {
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
     pub choice: Choice,
     /// States that a new branch of progressive widening starts with: so many are drawn at its parent, stepped, and weighted by
-    /// the branch's observation. Rollouts then ask [`pomdp::Policy::belief_action`], with these states as a particle filter. At 0, which a file
+    /// the branch's observation. Rollouts then act on [what an agent with these states would believe](pomdp::Policy::belief_action). At 0, which a file
     /// without this key means, a branch starts with the state of its simulation, and rollouts see the state.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_default"))]
     pub branch_states: usize,
@@ -77,7 +77,7 @@ pub struct Config {
     pub early_stop: Option<EarlyStop>,
     /// Most nodes of all trees together, at least one per tree. States stored by progressive widening count as nodes.
     /// When the nodes are used up, the tree stops growing: simulations that leave it continue as rollouts, and
-    /// [`crate::SearchReport::unexpanded`] counts them. Pruning frees nodes.
+    /// [are counted](crate::SearchReport::unexpanded). Pruning frees nodes.
     pub nodes: usize,
     /// Independent trees (root parallelism) that share the budget evenly. Each has its own random stream, drawn from
     /// the caller's generator; a single tree uses that generator itself. The merged statistics of their roots choose
@@ -125,7 +125,7 @@ pub enum Exploration {
 pub enum RolloutDepth {
     /// To the horizon of the simulation, as published.
     Full,
-    /// At most this many actions; the rest counts as [`pomdp::Policy::leaf_value`].
+    /// At most this many actions; the rest counts as [the value that the policy gives a leaf](pomdp::Policy::leaf_value).
     Actions(usize),
 }
 

@@ -82,9 +82,9 @@ pub struct EffectsConfig {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Filter {
-    /// As published: [`belief::RejectionFilter`].
+    /// As published: [rejection](belief::RejectionFilter) of particles.
     Rejection,
-    /// From the network's estimate to the exact posterior: [`belief::BridgeFilter`].
+    /// [In steps](belief::BridgeFilter) from the network's estimate to the exact posterior.
     Bridge,
 }
 
@@ -190,7 +190,7 @@ impl SearchSteps {
 pub enum Rollouts {
     /// The tool goes to the object's centre, as published. What follows a cut rollout counts as 0.
     Heuristic,
-    /// [`push_task::GoalPolicy`]: pushes to the goal, past the obstacle of its particle. What follows a cut rollout
+    /// [Pushes to the goal](push_task::GoalPolicy), past the obstacle of its particle. What follows a cut rollout
     /// counts as the policy's leaf value.
     Goal,
 }
@@ -203,7 +203,7 @@ pub struct DataConfig {
     pub movable_share: f64,
     /// Actions in an episode; fewer if the world diverges. Reaching the goal does not end it.
     pub episode_actions: usize,
-    /// Share of the episodes played by [`push_task::GoalPolicy`], the others by the heuristic policy.
+    /// Share of the episodes played by [a policy that pushes to the goal](push_task::GoalPolicy), the others by the heuristic policy.
     pub goal_share: f64,
     /// Share of uniformly random actions in every episode.
     pub exploration_share: f64,

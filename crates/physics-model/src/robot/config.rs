@@ -15,7 +15,7 @@ use super::RobotError;
 pub struct RobotConfig {
     /// Name in tables and folders.
     pub name: String,
-    /// URDF file, relative to the folder that [`Robot::load`](super::Robot::load) is given.
+    /// URDF file, relative to [the project folder](super::Robot::load).
     pub urdf: PathBuf,
     /// Link whose frame is the base frame; z must be up.
     pub base_link: String,
