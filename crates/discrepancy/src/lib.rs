@@ -81,6 +81,7 @@ pub mod terms;
 pub mod thin;
 pub mod touch;
 pub mod trial;
+mod tunable;
 mod units;
 mod verdict;
 pub mod warning;

@@ -28,6 +28,9 @@ use crate::report::{NamedEffect, Report};
 /// Version of the format.
 const VERSION: u32 = 1;
 
+/// Key of the cone of friction, which is not re-tuned for balls.
+const CONE: &str = "contact.cone_exponent";
+
 /// Size of a file.
 const MOST_BYTES: u64 = 4 << 20;
 /// Largest value of the nominal model, in units of its key.
@@ -172,12 +175,16 @@ impl ModelFile {
         for (key, value) in &self.nominal {
             let known: Vec<String> = nominal.tunables.iter().map(|tunable| tunable.key.clone()).collect();
             let Some(tunable) = nominal.tunables.iter_mut().find(|tunable| tunable.key == *key) else {
+                // Of another object on the same table: a ball has no cone of friction that is re-tuned.
+                if key == CONE && nominal.has_tool() {
+                    continue;
+                }
                 let key = one_line(key, 100);
                 let reason = format!("key `nominal.{key}`: expected one of {}", known.join(", "));
                 return Err(Error::Model { reason });
             };
             if !tunable.takes(*value) {
-                let reason = format!("key `nominal.{key}`: expected more than 0, found {value}");
+                let reason = format!("key `nominal.{key}`: expected {}, found {value}", tunable.expected());
                 return Err(Error::Model { reason });
             }
             tunable.set(*value);

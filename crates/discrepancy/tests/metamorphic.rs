@@ -1,4 +1,4 @@
-//! What cannot change an answer: other units, frames, orders and clocks of the same log.
+//! What cannot change an answer: other units, frames (where friction is the same in all directions), orders and clocks of the same log.
 
 use std::path::Path;
 

@@ -46,7 +46,7 @@ pub(crate) fn oppose(context: &mut ContactModificationContext, exponent: f32) {
         let response =
             |along: Vector| free.into_iter().flatten().map(|body| response(body, point, along)).sum::<Vector>();
         // What friction opposes, as long as the slip.
-        let opposed = if exponent == 1.0 { slip } else { by_cone(slip, exponent).normalize() * slip.length() };
+        let opposed = if exponent == 1.0 { slip } else { by_cone(slip, exponent).normalize_or_zero() * slip.length() };
         // Two orthogonal tangents give K's trace; K v follows from linearity.
         let across = normal.cross(opposed);
         let k_slip = response(opposed);

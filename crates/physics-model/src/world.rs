@@ -161,9 +161,8 @@ impl<'a> World<'a> {
 
     /// The same with the friction of a rig, see [`crate::rig::Rig::tool_slip_mps`] and [`crate::rig::Rig::cone_exponent`].
     pub(crate) fn sliding(mut self, tool_slip_mps: f64, cone_exponent: f64) -> Self {
-        if let Some(friction) = &mut self.rig_friction {
-            (friction.slip_mps, friction.exponent) = (tool_slip_mps as f32, cone_exponent as f32);
-        }
+        let (slip_mps, exponent) = (tool_slip_mps as f32, cone_exponent as f32);
+        self.rig_friction = self.rig_friction.map(|friction| RigFriction { slip_mps, exponent, ..friction });
         self
     }
 

@@ -26,6 +26,8 @@ const SOLE_GAP_M: f64 = 0.000_3;
 /// Rate (rad/s) and damping ratio of the contact of one of many points, and of one alone.
 const SUPPORT: (f64, f64) = (300.0, 1.0);
 const ALONE: (f64, f64) = (800.0, 1.5);
+/// An exponent of the cone of friction that differs from 1 by more than this factor is a pyramid's.
+const PYRAMID: f64 = 2.0;
 /// Rate at which friction stops a slip, 1/s, and impedance of contacts.
 const STOP_RATE: f64 = 1500.0;
 const IMPEDANCE: f64 = 0.001;
@@ -124,9 +126,24 @@ fn unsaid(scene: &Scene, built: &Built, shape: &Shape) -> String {
     if built.damping_nspm != 0.0 && built.nominal.hidden.iter().any(|body| body.movable) {
         notes += "\n  Only the object is damped, not the body in its way.";
     }
+    notes += pyramid(scene.rig.cone_exponent).as_str();
     notes += "\n  Contacts are those of this file, not `contact.*` of model.toml. Clocks are about the log.";
     notes += "\n  Begin with the keyframe `start`. The joints are at the centre of mass; the site `object` is the centre of the shape.";
     notes
+}
+
+/// What this file lacks of friction that is not Coulomb's.
+fn pyramid(exponent: f64) -> String {
+    let exponent = match exponent {
+        exponent if exponent > PYRAMID => format!("{exponent:.1}; `cone=\"pyramidal\"` has one as well"),
+        exponent if exponent < PYRAMID.recip() => {
+            format!("{exponent:.2}; MuJoCo has none whose friction is more between the axes")
+        }
+        _ => return String::new(),
+    };
+    format!(
+        "\n  Friction on the table was found with a pyramid along x and y, which is not in this file (exponent {exponent})."
+    )
 }
 
 /// Coordinates of the object upright on the table, of a tool beside it, and of bodies that can move.

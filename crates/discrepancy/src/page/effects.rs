@@ -172,7 +172,13 @@ pub(super) fn nominal(retuned: &[Retuned], words: &Words) -> Markup {
 
 fn z_row(axis: &Axis, value: &Retuned) -> Markup {
     let [mean, stddev] = value.prior;
-    let z = |v: f64| if stddev > 0.0 { (v - mean) / stddev } else { 0.0 };
+    // Of contacts the logarithm is normal, within a factor that is too large for a straight line.
+    let is_factor = value.key.starts_with("contact.") && mean > 0.0;
+    let z = |v: f64| match stddev {
+        stddev if stddev <= 0.0 => 0.0,
+        stddev if is_factor => (v.max(f64::MIN_POSITIVE) / mean).ln() * mean / stddev,
+        stddev => (v - mean) / stddev,
+    };
     let score = z(value.value);
     let inside = html! {
         (upright("mark", axis, 0.0, 24))

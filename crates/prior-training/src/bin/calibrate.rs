@@ -45,6 +45,7 @@ struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask calibrate --out runs/calibration/sawyer
+of episodes that training has not seen, which this makes before:
   cargo xtask datagen --seed 2 --out runs/held-out/sawyer";
 
 /// The report.
