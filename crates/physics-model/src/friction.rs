@@ -14,6 +14,9 @@ use rapier3d::prelude::{ContactModificationContext, PhysicsHooks, RigidBody, Vec
 
 use crate::arm::LINK;
 
+/// Square of a slip, m²/s², that has no direction.
+const NO_SLIP: f32 = 1e-12;
+
 /// Hook that makes friction oppose the slip; see the module.
 pub(crate) struct OpposeSlip;
 
@@ -40,7 +43,7 @@ pub(crate) fn oppose(context: &mut ContactModificationContext, exponent: f32) {
         let velocity = |body: Option<&RigidBody>| body.map_or(Vector::ZERO, |b| b.velocity_at_point(point));
         let slip = velocity(first) - velocity(second);
         let slip = slip - normal * slip.dot(normal);
-        if slip.length_squared() < 1e-12 {
+        if slip.length_squared() < NO_SLIP {
             continue;
         }
         let response =
@@ -61,7 +64,7 @@ pub(crate) fn oppose(context: &mut ContactModificationContext, exponent: f32) {
 ///
 /// Friction of most dissipation in the unit ball of a p-norm in x and y: `g_i = sign(v_i) |v_i|^e / ‖v‖_(e+1)^e` with e = 1 / (p − 1). Coulomb's cone is
 /// e = 1, a pyramid with its edges on the axes is e → ∞ (friction is less between the axes), one with its faces across them e → 0 (it is more).
-pub(crate) fn by_cone(slip: Vector, exponent: f32) -> Vector {
+fn by_cone(slip: Vector, exponent: f32) -> Vector {
     let largest = slip.x.abs().max(slip.y.abs());
     if largest == 0.0 {
         return Vector::ZERO;
@@ -70,6 +73,11 @@ pub(crate) fn by_cone(slip: Vector, exponent: f32) -> Vector {
     let (x, y) = (power(slip.x), power(slip.y));
     let norm = (x * (slip.x / largest).abs() + y * (slip.y / largest).abs()).powf(exponent / (exponent + 1.0));
     Vector::new(x.copysign(slip.x), y.copysign(slip.y), 0.0) / norm
+}
+
+/// Share of μ that friction on a level table has in a cone of this shape.
+pub(crate) fn share(slip: Vector, exponent: f32) -> f32 {
+    if exponent == 1.0 || slip.length_squared() < NO_SLIP { 1.0 } else { by_cone(slip, exponent).length() }
 }
 
 /// Velocity that a unit impulse `along` at `point` gives to that point of a free body.

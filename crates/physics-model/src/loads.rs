@@ -10,7 +10,7 @@ use rapier3d::prelude::{
 use crate::bodies::Body;
 use crate::config::WorldConfig;
 use crate::effect::{BodyView, Effects, Hooks, Load, Surroundings, TableContact};
-use crate::friction::{by_cone, oppose};
+use crate::friction::{oppose, share};
 use crate::theta::ObjectShape;
 use crate::world::{Wrench, array, vector};
 
@@ -122,7 +122,7 @@ pub(crate) struct RigFriction {
     pub(crate) fall_mps: f32,
     /// Slip below which friction of that pair is in proportion to it, m/s; 0: never.
     pub(crate) slip_mps: f32,
-    /// Shape of the cone of friction on the table (see [`by_cone`]); 1: Coulomb's.
+    /// Shape of the cone of friction on the table (see [`crate::friction`]); 1: Coulomb's.
     pub(crate) exponent: f32,
 }
 
@@ -185,12 +185,8 @@ impl PhysicsHooks for ContactFriction<'_> {
                 let velocity = body.velocity_at_point(point);
                 let slip = velocity - normal * velocity.dot(normal);
                 let contact = TableContact { position_m: array(point), slip_mps: array(slip) };
-                let cone = if exponent == 1.0 || slip.length_squared() < 1e-12 {
-                    1.0
-                } else {
-                    by_cone(slip, exponent).length()
-                };
-                f64::from(cone) * self.effects.list.iter().map(|effect| effect.friction(&contact)).product::<f64>()
+                f64::from(share(slip, exponent))
+                    * self.effects.list.iter().map(|effect| effect.friction(&contact)).product::<f64>()
             };
             // The engine has one coefficient for all points of two shapes.
             let sum: f64 = manifold.solver_contacts.iter().map(|c| factor((c.anchor1 + c.anchor2) * 0.5)).sum();
