@@ -8,8 +8,10 @@ use end_to_end::{files, root, stderr};
 use serde_json::Value;
 
 /// Packages with programs.
-const WITH_PROGRAMS: [&str; 9] = [
+const WITH_PROGRAMS: [&str; 11] = [
+    "arm-dynamics",
     "bench",
+    "book",
     "datagen",
     "diagnose-benchmark",
     "discrepancy",

@@ -49,7 +49,7 @@ fn packages() -> Vec<PathBuf> {
 fn example() -> PathBuf {
     let (from, to) = (root().join("examples/outside"), outside().join("example"));
     std::fs::create_dir_all(to.join("src")).unwrap();
-    for file in ["Cargo.toml", "src/main.rs"] {
+    for file in ["Cargo.toml", "src/main.rs", "src/rock_sample.rs"] {
         std::fs::copy(from.join(file), to.join(file)).unwrap();
     }
     std::fs::copy(root().join("Cargo.lock"), to.join("Cargo.lock")).unwrap();
@@ -73,6 +73,8 @@ fn the_example_outside_plans_with_the_packaged_crates() {
     let packages = packages();
     packages.iter().for_each(|package| is_complete(package));
     let manifest = example();
+    let main = std::fs::read_to_string(root().join("examples/outside/src/main.rs")).unwrap();
+    assert!(main.lines().count() <= 40, "the search of the example: {} lines", main.lines().count());
     let mut run = cargo(&["run", "--release"]);
     run.arg("--manifest-path").arg(&manifest);
     for (name, folder) in PACKAGES.iter().zip(&packages) {

@@ -50,8 +50,12 @@ pub(crate) const VIEWER: &str = "to-rerun";
 
 /// The one program that is apart: it brings the viewer's library, which nothing else should wait for.
 ///
-/// An episode that is not there is told before that library is built, in a quarter of an hour.
+/// Help, and that an episode is not there, are told before that library is built, in a quarter of an hour.
 pub(crate) fn become_viewer(arguments: &[String]) -> Result<ExitCode> {
+    if asks_for_help(arguments) && !path(VIEWER).exists() {
+        program::show(&viewer_help());
+        return Ok(ExitCode::SUCCESS);
+    }
     if let Some(problem) = missing_episode(arguments) {
         program::complain(&problem);
         return Ok(ExitCode::from(2));
@@ -59,9 +63,20 @@ pub(crate) fn become_viewer(arguments: &[String]) -> Result<ExitCode> {
     build_and_become(&["--package", "recording", "--features", "rerun", "--bin", VIEWER], VIEWER, arguments)
 }
 
+fn viewer_help() -> String {
+    let menu = <crate::Menu as clap::CommandFactory>::command();
+    let verb = menu.find_subcommand("rerun").cloned().unwrap_or_default();
+    // What is handed on stands below, one by one.
+    verb.bin_name("cargo xtask rerun").mut_arg("arguments", |rest| rest.hide(true)).render_long_help().to_string()
+}
+
+fn asks_for_help(arguments: &[String]) -> bool {
+    arguments.iter().any(|argument| ["-h", "--help", "-V", "--version"].contains(&argument.as_str()))
+}
+
 /// What the viewer's program would say of its command line, as far as it is about the episode; `None` where that is there, and where help is asked for.
 fn missing_episode(arguments: &[String]) -> Option<String> {
-    if arguments.iter().any(|argument| ["-h", "--help", "-V", "--version"].contains(&argument.as_str())) {
+    if asks_for_help(arguments) {
         return None;
     }
     let mut rest = arguments.iter();
@@ -167,6 +182,7 @@ mod tests {
         assert!(problem(&["nothere"]).starts_with("nothere: expected an episode"));
         assert!(problem(&[]).starts_with("rerun: expected the folder of an episode"));
         assert!(problem(&["--out", "a.rrd"]).starts_with("rerun: expected"));
+        assert!(super::viewer_help().contains("--out <FILE>") && super::viewer_help().contains("trace.json"));
         std::fs::write(&trace, "{}").unwrap();
         for good in
             [&[path.as_str()][..], &[trace.to_str().unwrap()], &["--out=a", &path], &["--help"], &["nothere", "-h"]]

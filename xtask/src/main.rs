@@ -46,7 +46,13 @@ enum Verb {
     /// Makes a recording of an episode for the Rerun viewer; its first build takes long.
     #[command(
         disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask rerun runs/demo/D4-sawyer-surmise-mixture"
+        override_usage = "cargo xtask rerun [OPTIONS] <EPISODE>",
+        after_help = "\
+<EPISODE>     Folder of the episode, or its trace.json
+--out <FILE>  The recording [default: episode.rrd beside trace.json]
+
+Examples:
+  cargo xtask rerun runs/demo/D4-sawyer-surmise-mixture"
     )]
     Rerun(Rest),
     /// Turns a recording or published measurements into a log that can be diagnosed.

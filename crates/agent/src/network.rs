@@ -22,7 +22,16 @@ impl Network {
     /// A file that is missing, damaged, or made for another arm or filter.
     pub fn load(folder: &Path, problem: &Problem) -> Result<Self, prior::Error> {
         let robot = &problem.scenario.robot.name;
-        Ok(match problem.scenario.belief.filter {
+        let filter = problem.scenario.belief.filter;
+        let (expected, found) = match filter {
+            Filter::Rejection => (prior::checkpoint::FILE, prior::posterior::FILE),
+            Filter::Bridge => (prior::posterior::FILE, prior::checkpoint::FILE),
+        };
+        if !folder.join(expected).exists() && folder.join(found).exists() {
+            let (folder, filter) = (folder.to_path_buf(), filter.name());
+            return Err(prior::Error::OtherKind { folder, found, expected, filter });
+        }
+        Ok(match filter {
             Filter::Rejection => Self::Suggester(Box::new(Suggester::load(folder, robot, &problem.model)?)),
             Filter::Bridge => Self::Posterior(Box::new(PosteriorNetwork::load(folder, robot, &problem.model)?)),
         })

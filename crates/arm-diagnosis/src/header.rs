@@ -136,7 +136,10 @@ impl Header {
             return Err(refuse(path, &format!("version = {}, expected 1", self.version)));
         }
         if !(self.period_secs > 0.0 && self.period_secs <= 1.0) {
-            return Err(refuse(path, &format!("period_secs = {:?}, expected a time of at most 1 s", self.period_secs)));
+            return Err(refuse(
+                path,
+                &format!("period_secs = {:?}, expected seconds, above 0 and at most 1", self.period_secs),
+            ));
         }
         if !(0.0..=100.0).contains(&self.gravity_mps2) {
             return Err(refuse(path, &format!("gravity_mps2 = {:?}, expected 0 to 100 m/s²", self.gravity_mps2)));

@@ -87,7 +87,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
         &worlds,
         &json!({
             "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": from.seed,
-            "set": from.set, "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
+            "set": from.overrides.set, "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
         }),
     );
     whole_file::write(&out.join("calibration.json"), pretty(&summary).as_bytes(), Existing::Replace)?;

@@ -126,7 +126,7 @@ pub fn run(root: &Path, task: &Task, note: impl Fn(&str) + Sync) -> Result<Value
         })
     })?;
     Ok(json!({
-        "domain": from.domain, "robot": from.robot, "worlds": task.worlds, "seed": from.seed, "set": from.set,
+        "domain": from.domain, "robot": from.arm.robot, "worlds": task.worlds, "seed": from.seed, "set": from.overrides.set,
         "threads": scenario.planner.threads, "commit": scenario::commit(root),
         "search": figures(&mut parts.search), "update": figures(&mut parts.update),
     }))
@@ -163,7 +163,12 @@ mod tests {
     fn actions_are_counted_with_their_search_and_their_update() {
         let root = scenario::find_root(env!("CARGO_MANIFEST_DIR").as_ref()).unwrap();
         let set = ["planner.budget={ transitions = 200 }", "task.horizon=3"].map(String::from).to_vec();
-        let from = Worlds { domain: "D1".into(), robot: "sawyer".into(), seed: 3, set };
+        let from = Worlds {
+            domain: "D1".into(),
+            arm: program::Arm { robot: "sawyer".into() },
+            seed: 3,
+            overrides: program::Overrides { set },
+        };
         let task = Task { from, worlds: 2, threads: 1 };
         let found = run(&root, &task, |_| ()).unwrap();
         assert_eq!((&found["search"]["count"], &found["update"]["count"]), (&json!(6), &json!(6)), "{found}");

@@ -97,9 +97,8 @@ enum What {
         /// Worlds, played one after the other.
         #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
         worlds: u32,
-        /// Threads of search and update [default: all cores].
-        #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
-        threads: Option<u16>,
+        #[command(flatten)]
+        work: program::Threads,
     },
     /// Speed, returns and exact values of the search on the standard problems.
     #[command(after_help = "Examples:\n  cargo xtask bench planner --quick")]
@@ -206,9 +205,8 @@ fn run(arguments: &Arguments) -> Result<()> {
             let task = policy::Task { from: from.clone(), worlds: *worlds, blind: *blind, trace: *trace };
             program::out!("{}", policy::run(&root, &task)?);
         }
-        What::Decision { from, worlds, threads } => {
-            let threads = threads.map_or(0, usize::from);
-            let task = decision::Task { from: from.clone(), worlds: *worlds, threads };
+        What::Decision { from, worlds, work } => {
+            let task = decision::Task { from: from.clone(), worlds: *worlds, threads: work.count() };
             let figures = decision::run(&root, &task, |text| program::say!("{text}"))?;
             program::out!("{}", serde_json::to_string_pretty(&figures)?);
         }

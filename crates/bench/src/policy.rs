@@ -66,7 +66,7 @@ pub fn run(root: &Path, task: &Task) -> Result<Value> {
     let (mean_return, standard_error) = mean_and_error(&each(&|world| world.discounted_return));
     let unsolved: Vec<usize> = (0..played.len()).filter(|&world| !played[world].solved).collect();
     Ok(json!({
-        "domain": from.domain, "robot": from.robot, "seed": from.seed, "worlds": played.len(), "blind": task.blind, "set": from.set,
+        "domain": from.domain, "robot": from.arm.robot, "seed": from.seed, "worlds": played.len(), "blind": task.blind, "set": from.overrides.set,
         "commit": scenario::commit(root),
         "solved": played.len() - unsolved.len(),
         "return": mean_return, "standard_error": standard_error,
@@ -159,7 +159,12 @@ mod tests {
     use super::*;
 
     fn task(blind: bool, trace: Option<u32>) -> Task {
-        let from = Worlds { domain: "D4".into(), robot: "sawyer".into(), seed: 1, set: Vec::new() };
+        let from = Worlds {
+            domain: "D4".into(),
+            arm: program::Arm { robot: "sawyer".into() },
+            seed: 1,
+            overrides: program::Overrides::default(),
+        };
         Task { from, worlds: 40, blind, trace }
     }
 

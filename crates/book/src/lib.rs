@@ -7,6 +7,7 @@ mod commands;
 mod effects;
 mod glossary;
 mod html;
+mod joints;
 mod keys;
 mod markdown;
 mod picture;
@@ -41,6 +42,7 @@ impl Page {
 pub fn pages(root: &Path, menu: &str) -> Result<Vec<Page>> {
     let mut pages = vec![commands::page(menu)?, keys::scenario_page(root)?, keys::robot_page(root)?];
     pages.push(glossary::page(root)?);
+    pages.push(joints::page());
     pages.extend(effects::pages(root)?);
     Ok(pages)
 }

@@ -24,9 +24,8 @@ struct Arguments {
     /// Instead of building, says which of those pages are out of date.
     #[arg(long, conflicts_with_all = ["out", "no_api"])]
     check: bool,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 /// Crates that are nobody's library.
@@ -44,7 +43,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let root = scenario::project_root(arguments.root.as_deref())?;
+    let root = scenario::project_root(arguments.project.root.as_deref())?;
     if arguments.write || arguments.check {
         return made_pages(&root, arguments.write);
     }

@@ -19,9 +19,8 @@ use scenario::Selection;
 #[derive(Debug, Parser)]
 #[command(name = "datagen", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer, jaco, or a robot file.
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
+    #[command(flatten)]
+    arm: program::Arm,
     /// Transitions to generate [default: 150000 for sawyer, 200000 for jaco, 8000 with --quick].
     #[arg(long)]
     transitions: Option<u64>,
@@ -37,24 +36,21 @@ struct Arguments {
     /// Makes only this shard, as the tasks of an array do. The command without --worker finishes the dataset.
     #[arg(long, value_name = "SHARD")]
     worker: Option<u32>,
-    /// Worker threads of the local executor [default: all cores].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    work: program::Threads,
     /// A small dataset, in a minute.
     #[arg(long)]
     quick: bool,
     /// Scenario of the worlds: a name in scenarios/ or a file.
     #[arg(long, default_value = "training")]
     scenario: String,
-    /// Overrides a scenario entry: key=value.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: program::Overrides,
     /// Folder of the dataset [default: runs/data/ROBOT, runs/quick/data/ROBOT with --quick].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
     /// Prints the result as one JSON object.
     #[arg(long)]
     json: bool,
@@ -107,7 +103,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     #[expect(clippy::disallowed_methods, reason = "a program may measure its rate")]
     let started = std::time::Instant::now();
     match arguments.executor {
-        Executor::Local => job.play_here(&missing, arguments.threads.unwrap_or(0), &bar, &interrupted)?,
+        Executor::Local => job.play_here(&missing, arguments.work.count(), &bar, &interrupted)?,
         Executor::Engine(engine) => job.submit(engine, &missing, &bar, &interrupted)?,
     }
     bar.finish_and_clear();
@@ -117,7 +113,7 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let manifest = job.finish().context(FAILED)?;
     job.print(&manifest, &missing, started.elapsed().as_secs_f64(), arguments.json);
     if !arguments.json {
-        suggest_train(&job, &arguments.robot, arguments.quick);
+        suggest_train(&job, &arguments.arm.robot, arguments.quick);
     }
     Ok(true)
 }
@@ -142,11 +138,11 @@ struct Job {
 impl Job {
     /// Checks the input and writes nothing: a faulty arm must not leave a plan behind.
     fn new(arguments: &Arguments) -> Result<Self> {
-        let root = scenario::project_root(arguments.root.as_deref())?;
+        let root = scenario::project_root(arguments.project.root.as_deref())?;
         let scenario = Selection {
-            robot: arguments.robot.clone(),
+            robot: arguments.arm.robot.clone(),
             domain: arguments.scenario.clone(),
-            set: arguments.set.clone(),
+            set: arguments.overrides.set.clone(),
             ..Selection::new(&root)
         }
         .load()?;
@@ -198,8 +194,8 @@ impl Job {
         Ok(())
     }
 
-    fn play_here(&self, missing: &[u32], threads: u32, bar: &ProgressBar, interrupted: &AtomicBool) -> Result<()> {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build()?;
+    fn play_here(&self, missing: &[u32], threads: usize, bar: &ProgressBar, interrupted: &AtomicBool) -> Result<()> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
         let make = |&index: &u32| {
             if interrupted.load(Ordering::Relaxed) {
                 return Ok(());

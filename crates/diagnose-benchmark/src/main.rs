@@ -49,9 +49,8 @@ struct Arguments {
     /// Folder of the benchmark.
     #[arg(long, default_value = "runs/diagnose-benchmark")]
     out: PathBuf,
-    /// Number of sets at a time [default: all cores]; logs and answers do not depend on it.
-    #[arg(long)]
-    threads: Option<usize>,
+    #[command(flatten)]
+    work: program::Threads,
     /// Only scores the answers that are there.
     #[arg(long)]
     score_only: bool,
@@ -61,9 +60,8 @@ struct Arguments {
     /// Program that answers [default: diagnose, beside this program].
     #[arg(long)]
     diagnose: Option<PathBuf>,
-    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -82,7 +80,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let arms = arguments.root.as_deref();
+    let arms = arguments.project.root.as_deref();
     if let Some(root) = arms {
         physics_model::robot::check_root(root)?;
     }
@@ -110,8 +108,8 @@ fn run(arguments: &Arguments) -> Result<bool> {
     let folder = Folder::open(&arguments.out, &identity, arguments.score_only)?;
     let plan = Plan::new(options);
     let interrupted = program::interrupts()?;
-    let threads = arguments.threads.unwrap_or(0);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().context("cannot start threads")?;
+    let pool =
+        rayon::ThreadPoolBuilder::new().num_threads(arguments.work.count()).build().context("cannot start threads")?;
     if !arguments.score_only && !answer(&folder, &plan, &diagnose, arms, &pool, &interrupted)? {
         return Ok(false);
     }

@@ -24,6 +24,34 @@ pub struct LookAlike {
     pub tell_apart: &'static str,
 }
 
+/// All effects as JSON: those of objects and their world, and those that a log of joints may show.
+#[derive(Serialize)]
+pub struct List {
+    /// See [`effects`].
+    pub effects: Vec<Entry>,
+    /// Of joints and arms.
+    pub joint_effects: Vec<JointEntry>,
+}
+
+/// An effect of a joint or an arm.
+#[derive(Serialize)]
+pub struct JointEntry {
+    /// What is known of it.
+    pub effect: &'static arm_diagnosis::Effect,
+    /// Where each of its values is expected.
+    pub plausible: Vec<&'static str>,
+}
+
+/// All that can be named.
+#[must_use]
+pub fn list() -> List {
+    let joint = |effect: &'static arm_diagnosis::Effect| {
+        let plausible = effect.parameters.iter().map(|value| effect.plausible(value)).collect();
+        JointEntry { effect, plausible }
+    };
+    List { effects: effects(), joint_effects: arm_diagnosis::EFFECTS.iter().map(joint).collect() }
+}
+
 /// All effects, in the order of the catalogue.
 #[must_use]
 pub fn effects() -> Vec<Entry> {
@@ -67,13 +95,18 @@ fn of_joints() -> String {
     let mut text = String::from("\nOf an arm, by a log of its joints:\n\n");
     for effect in arm_diagnosis::EFFECTS {
         let place = if effect.of_joint { "of a joint" } else { "of the arm" };
-        let values = effect.parameters.iter().map(|value| match value.unit {
-            "1" => value.name.to_owned(),
-            unit => format!("{} in {unit}", value.name),
-        });
         text += &format!("{} ({place})\n", effect.name);
-        text += &wrapped(effect.summary);
-        text += &wrapped(&values.collect::<Vec<_>>().join(", "));
+        let mut say = |said: &str| text += &wrapped(said);
+        say(effect.summary);
+        for value in effect.parameters {
+            let unit = if value.unit == "1" { String::new() } else { format!(" in {}", value.unit) };
+            say(&format!("{}{unit}: {}", value.name, effect.plausible(value)));
+        }
+        say(&format!("{}.", effect.shows));
+        for (name, tell_apart) in effect.look_alikes {
+            say(&format!("Looks like {name}. To tell: {tell_apart}."));
+        }
+        text.push('\n');
     }
     text
 }
@@ -102,7 +135,8 @@ mod tests {
         for kind in EffectKind::ALL {
             assert!(text.lines().any(|line| line == kind.name()), "{}", kind.name());
         }
-        assert!(text.contains("torque_delay (of the arm)\n") && text.contains("delay in s\n"), "{text}");
+        assert!(text.contains("torque_delay (of the arm)\n"), "{text}");
+        assert!(text.contains("    delay in s: within about 0.02\n"), "{text}");
         assert!(text.lines().all(|line| line.chars().count() <= COLUMNS), "{text}");
         assert!(text.contains("c = coefficient_nspm in N·s/m: 0.1 to 2; no effect at: 0"), "{text}");
         assert!(text.contains("Looks like quadratic_drag. To tell: push and release at three speeds"), "{text}");

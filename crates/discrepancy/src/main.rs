@@ -43,18 +43,16 @@ struct Arguments {
     /// Holds out part I of K of the episodes instead of the share that the log says: K runs make a cross-validation.
     #[arg(long, value_name = "I/K", value_parser = fold)]
     fold: Option<[usize; 2]>,
-    /// Worker threads, 0 for all cores [default: 0]; the answer does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(0..=MOST_THREADS))]
-    threads: Option<u64>,
+    #[command(flatten)]
+    work: program::Threads,
     /// Lists the effects that can be named: parameters, what shows them, what they are confused with.
     #[arg(long, conflicts_with_all = ["measured", "model", "out", "fold"])]
     list_effects: bool,
     /// Prints report.json, or the list of effects as JSON.
     #[arg(long)]
     json: bool,
-    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -83,13 +81,11 @@ fn main() -> ExitCode {
 #[expect(clippy::disallowed_methods, reason = "the report says how long it took; nothing depends on it")]
 fn run(arguments: &Arguments) -> Result<(), Error> {
     let started = Instant::now();
-    if let Some(threads) = arguments.threads {
-        // Fails where a pool exists already: not here.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build_global();
-    }
+    // Fails where a pool exists already: not here.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(arguments.work.count()).build_global();
     // Clap asks for it unless the effects are to be listed.
     let Some(measured) = &arguments.measured else { return list_effects(arguments.json) };
-    if let Some(root) = &arguments.root {
+    if let Some(root) = &arguments.project.root {
         check_root(root)?;
     }
     if arm_diagnosis::is_joint_log(measured) {
@@ -100,7 +96,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         return joints::run(measured, arguments.out.as_ref(), arguments.seed, arguments.json);
     }
     let log = measured_log::read(measured)?;
-    let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.root.as_deref())?)?;
+    let mut nominal = Nominal::new(&log.header, rig_tool(&log, arguments.project.root.as_deref())?)?;
     let owner = owner(measured);
     let default = || folder::default(Path::new("runs/diagnose"), measured, &owner, &FILES);
     let out = arguments.out.clone().unwrap_or_else(default);
@@ -136,7 +132,7 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
 
 fn list_effects(json: bool) -> Result<(), Error> {
     let text = if json {
-        let list = serde_json::to_string_pretty(&discrepancy::listing::effects());
+        let list = serde_json::to_string_pretty(&discrepancy::listing::list());
         list.map_err(|error| Error::Model { reason: error.to_string() })? + "\n"
     } else {
         discrepancy::listing::text()
@@ -144,9 +140,6 @@ fn list_effects(json: bool) -> Result<(), Error> {
     program::show(&text);
     Ok(())
 }
-
-/// Worker threads, at most.
-const MOST_THREADS: u64 = 1024;
 
 /// Gives a nominal model what the file at `path` says; it must not be one that this diagnosis would write over.
 fn begin_with(path: &Path, out: &Path, nominal: &mut Nominal) -> Result<ModelFile, Error> {
@@ -263,7 +256,7 @@ fn simulated_truth(arguments: &Arguments, out: &Path, robot: Robot) -> Option<(&
         // Whatever pushed there, no task of ours has it.
         Robot::None => return None,
     };
-    let root = arguments.root.clone().or_else(|| find_root(Path::new(".")).ok())?;
+    let root = arguments.project.root.clone().or_else(|| find_root(Path::new(".")).ok())?;
     let base: Base = toml::from_str(&std::fs::read_to_string(root.join("scenarios/base.toml")).ok()?).ok()?;
     let found = ModelFile::read(&out.join("model.toml")).ok()?;
     let truth = base.effects.truth;

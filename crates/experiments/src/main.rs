@@ -16,6 +16,7 @@ use scenario::Selection;
 /// Plays trials of methods on a domain, or all tables with --all, and prints the table.
 #[derive(Debug, Parser)]
 #[command(name = "eval", version, after_help = EXAMPLES)]
+#[command(group = clap::ArgGroup::new("worlds_elsewhere").args(["world", "all"]).multiple(true))]
 struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
     #[arg(long, required_unless_present = "all")]
@@ -35,9 +36,8 @@ struct Arguments {
     /// With --all: copies the combined tables and pictures to assets/results.
     #[arg(long, requires = "all", conflicts_with_all = ["quick", "domain"])]
     publish: bool,
-    /// Arm: sawyer, jaco, or a robot file (docs/src/guides/arm.md).
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
+    #[command(flatten)]
+    arm: program::Arm,
     /// Preset of belief and planner: surmise, paper, or a file.
     #[arg(long, default_value = scenario::PRESET)]
     preset: String,
@@ -56,47 +56,50 @@ struct Arguments {
     #[arg(long, value_name = "COMMAND|ADDRESS")]
     world: Option<WorldAddress>,
     /// How long a world may take to start and say hello, s.
-    #[arg(long, default_value = "60", value_parser = seconds)]
+    #[arg(long, default_value = "60", value_parser = seconds, requires = "worlds_elsewhere")]
     world_start_secs: Duration,
     /// How long a world may take to set up a trial, s.
-    #[arg(long, default_value = "60", value_parser = seconds)]
+    #[arg(long, default_value = "60", value_parser = seconds, requires = "worlds_elsewhere")]
     world_reset_secs: Duration,
     /// How long a world may take for an action, s.
-    #[arg(long, default_value = "60", value_parser = seconds)]
+    #[arg(long, default_value = "60", value_parser = seconds, requires = "worlds_elsewhere")]
     world_act_secs: Duration,
     /// Who plays: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
-    /// Number of tasks that slurm or hq cut the trials into.
-    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    shards: u32,
+    /// Number of tasks that slurm or hq cut the trials into [default: 20].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    shards: Option<u32>,
     /// Plays only this shard, as the tasks of an array do. The command without --worker makes the tables.
     #[arg(long, value_name = "SHARD")]
     worker: Option<u32>,
-    /// Worker threads, each with a world of its own [default: all cores; 1 with a world behind a socket, and in tasks of slurm or hq].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    work: program::Threads,
     /// Small budgets: a run of a minute or two whose figures mean nothing.
     #[arg(long)]
     quick: bool,
     /// A model.toml that `cargo xtask diagnose` wrote: planner and belief take its effects into account (effects.model).
     #[arg(long, value_name = "FILE", conflicts_with = "all")]
     model: Option<PathBuf>,
-    /// Overrides a scenario entry: key=value.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: program::Overrides,
     /// Folder of the trained prior [default: the one trained here with the same --quick, else the shipped one].
     #[arg(long)]
     prior: Option<PathBuf>,
     /// Run directory [default: runs/eval/DOMAIN-ROBOT-PRESET, or runs/all with --all; runs/quick/… with --quick].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
     /// Prints the table as JSON.
     #[arg(long)]
     json: bool,
+}
+
+impl Arguments {
+    fn shards(&self) -> u32 {
+        self.shards.unwrap_or(20)
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -114,7 +117,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let root = scenario::project_root(arguments.root.as_deref())?;
+    let root = scenario::project_root(arguments.project.root.as_deref())?;
     check_shards(arguments)?;
     match &arguments.domain {
         Some(domain) => run_one(arguments, &root, domain),
@@ -131,9 +134,9 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
         root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(evaluation.name())
     });
     if let Some(index) = arguments.worker {
-        let run = evaluation.open_worker(&out, Shard { index, of: arguments.shards })?;
+        let run = evaluation.open_worker(&out, Shard { index, of: arguments.shards() })?;
         let interrupted = program::interrupts()?;
-        let player = Player { threads: Some(arguments.threads.unwrap_or(1)), interrupted: &interrupted };
+        let player = Player { threads: Some(arguments.work.threads.unwrap_or(1)), interrupted: &interrupted };
         return player.play(&evaluation, &run).context(FAILED);
     }
     if let Executor::Engine(engine) = arguments.executor {
@@ -155,7 +158,7 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     let interrupted = program::interrupts()?;
     let finished = match arguments.executor {
         Executor::Local => {
-            let player = Player { threads: arguments.threads, interrupted: &interrupted };
+            let player = Player { threads: arguments.work.threads, interrupted: &interrupted };
             player.play(&evaluation, &run).context(FAILED)?
         }
         Executor::Engine(engine) => submit(engine, &run, arguments, &interrupted)?,
@@ -188,7 +191,7 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
         trials: arguments.trials,
         seed: arguments.seed,
         quick: arguments.quick,
-        set: arguments.set.clone(),
+        set: arguments.overrides.set.clone(),
         keep_finished: arguments.keep_finished,
         prior: arguments.prior.clone(),
         python: arguments.python.clone(),
@@ -197,7 +200,7 @@ fn run_all(arguments: &Arguments, root: &Path) -> Result<bool> {
     let mut note = |text: &str| program::say!("{text}");
     let suite = Suite::prepare(request, &mut note)?;
     let interrupted = program::interrupts()?;
-    let player = Player { threads: arguments.threads, interrupted: &interrupted };
+    let player = Player { threads: arguments.work.threads, interrupted: &interrupted };
     if !suite.play(&player, &mut note).context(FAILED)? {
         return Ok(false);
     }
@@ -235,10 +238,10 @@ fn request(arguments: &Arguments, root: &Path, domain: &str) -> Request {
         selection: Selection {
             root: root.to_path_buf(),
             domain: domain.into(),
-            robot: arguments.robot.clone(),
+            robot: arguments.arm.robot.clone(),
             preset: arguments.preset.clone(),
             quick: arguments.quick,
-            set: arguments.set.clone(),
+            set: arguments.overrides.set.clone(),
             effects: arguments.model.clone(),
         },
         methods: arguments.methods.clone(),
@@ -251,8 +254,11 @@ fn request(arguments: &Arguments, root: &Path, domain: &str) -> Request {
 
 /// What no array can do.
 fn check_shards(arguments: &Arguments) -> Result<()> {
-    if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards) {
-        bail!("--worker: expected a shard below {}, found {shard}", arguments.shards);
+    if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards()) {
+        bail!("--worker: expected a shard below {}, found {shard}", arguments.shards());
+    }
+    if arguments.shards.is_some() && arguments.worker.is_none() && matches!(arguments.executor, Executor::Local) {
+        bail!("--shards: only tasks of slurm or hq have shards: add --executor slurm or --executor hq");
     }
     if let (Executor::Engine(_), Some(WorldAddress::Tcp(_))) = (arguments.executor, &arguments.world) {
         bail!(
@@ -276,7 +282,7 @@ fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &Atomic
             finished = now;
         }
     };
-    let played = run.play_on(engine, arguments.shards, arguments.threads.unwrap_or(1), interrupted, &mut report);
+    let played = run.play_on(engine, arguments.shards(), arguments.work.threads.unwrap_or(1), interrupted, &mut report);
     match played {
         Ok(outcome) => Ok(outcome == Outcome::Finished),
         // The rest is of the kind that is said before anything is played.

@@ -7,13 +7,14 @@ use agent::Method;
 use indicatif::{ProgressBar, ProgressStyle};
 use pomdp::Seed;
 use rayon::prelude::*;
+use scenario::Problem;
 
 use crate::{Error, Evaluation, Run, TrialRecord, play, play_external};
 
 /// How trials are played. Nothing of it changes a result.
 #[derive(Clone, Copy, Debug)]
 pub struct Player<'a> {
-    /// Worker threads; all cores where `None`, one where all trials share a world behind a socket.
+    /// Worker threads, all cores where `None`. Each plays a trial; where all trials share a world behind a socket they search together for the one that is played.
     pub threads: Option<u32>,
     /// Set when the run is to stop: trials that have begun end first.
     pub interrupted: &'a AtomicBool,
@@ -35,29 +36,40 @@ impl Player<'_> {
         let style = "{bar:40} {pos}/{len} trials, {per_sec}, {eta} left {msg}";
         bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
         bar.enable_steady_tick(Duration::from_millis(200));
-        // One robot behind a socket plays one trial at a time.
-        let threads = self.threads.unwrap_or(u32::from(evaluation.socket));
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build()?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads.unwrap_or(0) as usize).build()?;
+        let problem = if evaluation.socket {
+            &evaluation.problem.searched_by(pool.current_num_threads())
+        } else {
+            &*evaluation.problem
+        };
         let failed = AtomicBool::new(false);
         let stop = || self.interrupted.load(Ordering::Relaxed) || failed.load(Ordering::Relaxed);
         let one = |&(method, trial): &(Method, u32)| {
             if stop() {
                 return Ok(());
             }
-            let kept = play_one(evaluation, method, trial).and_then(|record| run.keep(&record).map(|()| record));
+            let kept =
+                play_one(evaluation, problem, method, trial).and_then(|record| run.keep(&record).map(|()| record));
             let record = kept.inspect_err(|_| failed.store(true, Ordering::Relaxed))?;
             report(&bar, &record);
             Ok(())
         };
-        let results: Vec<Result<(), Error>> = pool.install(|| missing.par_iter().with_max_len(1).map(one).collect());
+        // One robot behind a socket plays one trial at a time.
+        let results: Vec<Result<(), Error>> = pool.install(|| {
+            if evaluation.socket {
+                missing.iter().map(one).collect()
+            } else {
+                missing.par_iter().with_max_len(1).map(one).collect()
+            }
+        });
         bar.finish_and_clear();
         results.into_iter().collect::<Result<Vec<()>, Error>>()?;
         Ok(!self.interrupted.load(Ordering::Relaxed))
     }
 }
 
-fn play_one(evaluation: &Evaluation, method: Method, trial: u32) -> Result<TrialRecord, Error> {
-    let Evaluation { problem, prior, worlds, .. } = evaluation;
+fn play_one(evaluation: &Evaluation, problem: &Problem, method: Method, trial: u32) -> Result<TrialRecord, Error> {
+    let Evaluation { prior, worlds, .. } = evaluation;
     let seed = Seed(evaluation.provenance.run.seed);
     let played = match worlds {
         Some(worlds) => play_external(problem, method, prior.as_ref(), seed, trial, worlds),

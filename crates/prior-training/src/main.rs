@@ -18,9 +18,8 @@ use program::{Failed, typed};
 #[derive(Debug, Parser)]
 #[command(name = "train", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer, jaco, or the robot file that the data were made with.
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
+    #[command(flatten)]
+    arm: program::Arm,
     /// Folder of the dataset [default: runs/data/ROBOT, runs/quick/data/ROBOT with --quick].
     #[arg(long)]
     data: Option<PathBuf>,
@@ -51,18 +50,16 @@ struct Arguments {
     /// Root seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Worker threads [default: all cores]; the weights do not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    work: program::Threads,
     /// A few epochs on the quick dataset.
     #[arg(long)]
     quick: bool,
     /// Fails unless there is an interrupted training to continue. Without this option one is continued where there is one.
     #[arg(long)]
     resume: bool,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -79,14 +76,14 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let root = prior::project_root(arguments.root.as_deref(), &std::env::current_dir()?)?;
+    let root = prior::project_root(arguments.project.root.as_deref(), &std::env::current_dir()?)?;
     let runs = root.join(if arguments.quick { "runs/quick" } else { "runs" });
-    let name = prior::robot_name(&arguments.robot);
+    let name = prior::robot_name(&arguments.arm.robot);
     let data = arguments.data.clone().unwrap_or_else(|| runs.join("data").join(name));
     let out = arguments.out.clone().unwrap_or_else(|| runs.join("priors").join(name));
-    rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
+    rayon::ThreadPoolBuilder::new().num_threads(arguments.work.count()).build_global()?;
 
-    let robot = &arguments.robot;
+    let robot = &arguments.arm.robot;
     let reader = Reader::open(&data).with_context(|| {
         format!("{}: no usable dataset, make one with `cargo xtask datagen --robot {robot}`", data.display())
     })?;

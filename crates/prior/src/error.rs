@@ -28,6 +28,18 @@ pub enum Error {
         #[source]
         source: std::io::Error,
     },
+    /// A network of the other kind of belief.
+    #[error("{}: holds {found}, expected {expected}, the network of belief.filter = \"{filter}\": choose another --prior or --preset", folder.display())]
+    OtherKind {
+        /// Folder of the network.
+        folder: PathBuf,
+        /// File that is there.
+        found: &'static str,
+        /// File that is missing.
+        expected: &'static str,
+        /// Filter of the scenario.
+        filter: &'static str,
+    },
     /// A dataset of another task.
     #[error("dataset: schema.{key} is {found}, expected {expected}")]
     Schema {

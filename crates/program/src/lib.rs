@@ -16,6 +16,7 @@
 mod arguments;
 mod ending;
 mod next;
+mod options;
 mod terminal;
 #[cfg(feature = "long-work")]
 mod work;
@@ -23,6 +24,7 @@ mod work;
 pub use arguments::parse;
 pub use ending::{Failed, code, end, failed, finish, is_denied, resumable};
 pub use next::{next, typed};
+pub use options::{Arm, Overrides, Project, Threads};
 pub use terminal::{complain, print, say, show};
 #[cfg(feature = "long-work")]
 pub use work::{interrupts, log_on_request};

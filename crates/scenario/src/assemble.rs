@@ -36,6 +36,14 @@ pub struct Problem {
 const DISPLACED: usize = 100;
 
 impl Problem {
+    /// The same with another number of threads that search, at most as many as are allowed. No result depends on it.
+    #[must_use]
+    pub fn searched_by(&self, threads: usize) -> Self {
+        let mut problem = self.clone();
+        problem.scenario.planner.threads = threads.clamp(1, 1024);
+        problem
+    }
+
     /// Loads the arm and puts the parts together.
     ///
     /// # Errors

@@ -150,6 +150,26 @@ fn prose(comment: &str) -> String {
         plain.extend([before, "`", name, "`"]);
         rest = tail;
     }
+    without_paths(&(plain + rest))
+}
+
+/// Of [words](crate::path), the words.
+fn without_paths(text: &str) -> String {
+    let mut plain = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once("](") {
+        let target = after.split_once(')').filter(|(target, _)| target.contains("::"));
+        match (target, before.rsplit_once('[')) {
+            (Some((_, behind)), Some((earlier, words))) => {
+                plain.extend([earlier, words]);
+                rest = behind;
+            }
+            _ => {
+                plain.extend([before, "]("]);
+                rest = after;
+            }
+        }
+    }
     plain + rest
 }
 
@@ -169,6 +189,12 @@ mod tests {
             Value::Array(list) => list.iter().for_each(|value| properties(value, path, found)),
             _ => (),
         }
+    }
+
+    #[test]
+    fn links_of_rustdoc_are_words() {
+        let doc = "They [are counted](crate::Report::unexpanded), as [`Tree`](crate::Tree) and [`Node`] say; see [this](page.md).";
+        assert_eq!(prose(doc), "They are counted, as `Tree` and `Node` say; see [this](page.md).");
     }
 
     #[test]

@@ -42,9 +42,8 @@ struct Check {
     /// Domain, a name in scenarios/ or a file; a resolved scenario.toml of a run too.
     #[arg(value_name = "FILE|DOMAIN")]
     domain: String,
-    /// Arm: sawyer, jaco, or a file.
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
+    #[command(flatten)]
+    arm: program::Arm,
     /// Preset: surmise, paper, or a file.
     #[arg(long, default_value = PRESET)]
     preset: String,
@@ -54,18 +53,16 @@ struct Check {
     /// A model.toml of diagnose: its effects become those of the planner's model.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Overrides a scenario entry: key=value.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: program::Overrides,
     /// Lists only keys that begin with this: planner, task.reward, distribution.object.
     #[arg(long, value_name = "PREFIX")]
     only: Option<String>,
     /// Prints one JSON object.
     #[arg(long)]
     json: bool,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -105,14 +102,14 @@ fn run(task: &Task) -> Result<()> {
 
 /// What a check prints.
 fn explain(check: &Check) -> Result<String> {
-    let root = project_root(check.root.as_deref())?;
+    let root = project_root(check.project.root.as_deref())?;
     let selection = Selection {
         root: root.clone(),
         domain: check.domain.clone(),
-        robot: check.robot.clone(),
+        robot: check.arm.robot.clone(),
         preset: check.preset.clone(),
         quick: check.quick,
-        set: check.set.clone(),
+        set: check.overrides.set.clone(),
         effects: check.model.clone(),
     };
     let (scenario, mut explanations) = selection.explain()?;
@@ -133,19 +130,19 @@ fn explain(check: &Check) -> Result<String> {
 /// Plays what was checked, with the same choices.
 fn suggest_next(check: &Check) {
     let mut chosen = vec!["--domain".to_string(), check.domain.clone()];
-    for (option, value, usual) in [("--robot", &check.robot, "sawyer"), ("--preset", &check.preset, PRESET)] {
+    for (option, value, usual) in [("--robot", &check.arm.robot, "sawyer"), ("--preset", &check.preset, PRESET)] {
         if value != usual {
             chosen.extend([option.to_string(), value.clone()]);
         }
     }
     chosen.extend(check.quick.then(|| "--quick".into()));
-    chosen.extend(check.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
+    chosen.extend(check.overrides.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
     let command = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
     let model = check.model.iter().flat_map(|path| ["--model".to_string(), typed(path)]);
     // Apart from what a network plays of it, which is another run.
     let stem = |name: &str| std::path::Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let runs = if check.quick { "runs/quick/eval" } else { "runs/eval" };
-    let out = format!("{runs}/{}-{}-{}-oracle", stem(&check.domain), stem(&check.robot), stem(&check.preset));
+    let out = format!("{runs}/{}-{}-{}-oracle", stem(&check.domain), stem(&check.arm.robot), stem(&check.preset));
     let oracle = ["--methods", "oracle,heuristic", "--out", &out].map(String::from);
     let eval = [command(&["cargo", "xtask", "eval"]), chosen.clone(), oracle.to_vec(), model.collect()].concat();
     let mut next = vec![(eval, "plays it with full knowledge, and without a plan: can it be solved?")];

@@ -85,8 +85,11 @@ impl Owner {
         if let Some(file) = files.iter().find(|file| folder.join(file).is_dir()) {
             return refuse(format!("expected a file {file} or none, found a folder"));
         }
-        match std::fs::read_to_string(folder.join(Self::FILE)) {
+        let mark = folder.join(Self::FILE);
+        match std::fs::read_to_string(&mark) {
             Ok(text) if text == self.text() => Ok(()),
+            Ok(text) if !text.is_empty() && !is_mark(&text) => refuse(foreign(self.program)),
+            Err(_) if mark.symlink_metadata().is_ok() => refuse(foreign(self.program)),
             // What was killed, or given up, before it wrote anything owns nothing; an empty mark is one that is being written.
             Ok(text) if !text.is_empty() && !holds_no_more(folder) => {
                 let mut lines = text.lines();
@@ -164,6 +167,19 @@ impl Claim {
     }
 }
 
+/// Programs whose results are marked so.
+const PROGRAMS: [&str; 2] = ["demo", "diagnose"];
+
+/// Whether a file's text is a mark: a program and a subject, in a line each.
+fn is_mark(text: &str) -> bool {
+    let lines: Vec<&str> = text.lines().collect();
+    lines.len() == 2 && PROGRAMS.contains(&lines[0]) && text.ends_with('\n')
+}
+
+fn foreign(program: &str) -> String {
+    format!("it holds {}, which {program} did not write", Owner::FILE)
+}
+
 /// Whether a folder holds the mark alone.
 fn holds_no_more(folder: &Path) -> bool {
     let inside = std::fs::read_dir(folder).map(|inside| inside.flatten().map(|entry| entry.file_name()).collect());
@@ -196,6 +212,23 @@ fn is_there(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_of_the_marks_name_that_is_none_stays_as_it_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let demo = Owner { program: "demo", subject: String::new() };
+        let mark = folder.path().join(Owner::FILE);
+        for text in [&b"alice\n"[..], b"demo", b"\xff\xfe", b"demo\n\nmore\n", b"rsync\nlogs\n"] {
+            std::fs::write(&mark, text).unwrap();
+            let checked = demo.check(folder.path(), &[]).unwrap_err().source.to_string();
+            assert_eq!(checked, "it holds .owner, which demo did not write: choose another folder");
+            assert_eq!(demo.claim(folder.path()).unwrap_err().source.to_string(), checked);
+            assert_eq!(std::fs::read(&mark).unwrap(), text);
+        }
+        std::fs::remove_file(&mark).unwrap();
+        std::fs::create_dir(&mark).unwrap();
+        assert!(demo.check(folder.path(), &[]).is_err());
+    }
 
     #[test]
     fn a_folder_is_one_programs_at_a_time() {

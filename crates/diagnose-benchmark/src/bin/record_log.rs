@@ -23,12 +23,10 @@ struct Arguments {
     /// Domain: tilted, D1 to D5, obstacle, or a scenario file.
     #[arg(long, default_value = "tilted")]
     domain: String,
-    /// Arm: sawyer, jaco, or a robot file.
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
-    /// Overrides a scenario entry: key=value; effects.truth=[…] is what diagnose has to find.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    arm: program::Arm,
+    #[command(flatten)]
+    overrides: program::Overrides,
     /// Pushes: designed to tell effects apart, or passive, as they come.
     #[arg(long, value_enum, default_value = "designed")]
     actions: Actions,
@@ -38,12 +36,11 @@ struct Arguments {
     /// Folder of the log; it must not hold one yet.
     #[arg(long)]
     out: PathBuf,
-    /// File for what the log hides, as diagnose-learn reads it: FOLDER/truth/log-000.json of a log in FOLDER/log-000.
+    /// File for what the log hides (`--set effects.truth=[…]`), as diagnose-learn reads it: FOLDER/truth/log-000.json of a log in FOLDER/log-000.
     #[arg(long)]
     truth: Option<PathBuf>,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -56,11 +53,11 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = scenario::project_root(arguments.root.as_deref())?;
+    let root = scenario::project_root(arguments.project.root.as_deref())?;
     let selection = Selection {
         domain: arguments.domain.clone(),
-        robot: arguments.robot.clone(),
-        set: arguments.set.clone(),
+        robot: arguments.arm.robot.clone(),
+        set: arguments.overrides.set.clone(),
         ..Selection::new(&root)
     };
     let problem = Problem::assemble(&selection.load()?, &root)?;
@@ -115,7 +112,7 @@ fn truth(arguments: &Arguments, root: &Path, problem: &Problem, log: &Log) -> Re
     let without = record(&Problem::assemble(&scenario, root)?, arguments.actions, Seed(arguments.seed))?;
     Ok(Truth {
         engine: "rapier".into(),
-        variant: arguments.robot.clone(),
+        variant: arguments.arm.robot.clone(),
         seed: arguments.seed,
         effects: hidden.iter().map(Named::new).collect(),
         outside: Vec::new(),

@@ -41,9 +41,8 @@ struct Aligned {
     /// Prints the values as one JSON object.
     #[arg(long)]
     json: bool,
-    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 #[derive(Debug, clap::Args)]
@@ -62,9 +61,8 @@ struct Checked {
     /// Prints the check as one JSON object.
     #[arg(long)]
     json: bool,
-    /// Project folder, for the arms [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -87,11 +85,11 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Checked) -> Result<bool, Error> {
-    if let Some(root) = &options.root {
+    if let Some(root) = &options.project.root {
         check_root(root)?;
     }
     let log = read(&options.log)?;
-    let tool = rig_tool(&log, options.root.as_deref())?;
+    let tool = rig_tool(&log, options.project.root.as_deref())?;
     let check = warning::check(&log, &tool);
     let nominal = Nominal::new(&log.header, tool)?;
     let sentences: Vec<String> = if options.readings_only {
@@ -121,11 +119,11 @@ fn read(folder: &Path) -> Result<measured_log::Log, Error> {
 }
 
 fn align(options: &Aligned) -> Result<(), Error> {
-    if let Some(root) = &options.root {
+    if let Some(root) = &options.project.root {
         check_root(root)?;
     }
     let log = read(&options.log)?;
-    let tool = rig_tool(&log, options.root.as_deref())?;
+    let tool = rig_tool(&log, options.project.root.as_deref())?;
     let arm = if let RigTool::Arm(arm) = &tool { Some(&**arm) } else { None };
     let unfit = |reason| Error::Unfit { log: options.log.display().to_string(), reason };
     let found = log_check::align(&log, arm).map_err(unfit)?;

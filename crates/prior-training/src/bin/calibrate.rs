@@ -16,9 +16,8 @@ use program::typed;
 #[derive(Debug, Parser)]
 #[command(name = "calibrate", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer, jaco, or a robot file.
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
+    #[command(flatten)]
+    arm: program::Arm,
     /// Folder of the prior [default: the one trained here, runs/priors/ROBOT, else the shipped one].
     #[arg(long)]
     prior: Option<PathBuf>,
@@ -31,15 +30,13 @@ struct Arguments {
     /// Folder of the report [default: the prior's].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Worker threads [default: all cores]; the report does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    work: program::Threads,
     /// Prints the report as one JSON object.
     #[arg(long)]
     json: bool,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -60,14 +57,14 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = prior::project_root(arguments.root.as_deref(), &std::env::current_dir()?)?;
-    let (robot, name) = (&arguments.robot, prior::robot_name(&arguments.robot));
+    let root = prior::project_root(arguments.project.root.as_deref(), &std::env::current_dir()?)?;
+    let (robot, name) = (&arguments.arm.robot, prior::robot_name(&arguments.arm.robot));
     let folder =
         arguments.prior.clone().unwrap_or_else(|| prior::default_folder(&root, name, prior::checkpoint::FILE, false));
     let data = arguments.data.clone().unwrap_or_else(|| root.join("runs/held-out").join(name));
     let out = arguments.out.clone().unwrap_or_else(|| folder.clone());
     check_out(&out)?;
-    rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
+    rayon::ThreadPoolBuilder::new().num_threads(arguments.work.count()).build_global()?;
 
     let checkpoint = Checkpoint::load(&folder, None)?;
     let reader = Reader::open(&data).with_context(|| {

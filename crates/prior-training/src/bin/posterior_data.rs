@@ -24,27 +24,23 @@ use serde_json::{Value, json};
 #[derive(Debug, Parser)]
 #[command(name = "posterior-data", version, after_help = EXAMPLES)]
 struct Arguments {
-    /// Arm: sawyer, jaco, or a robot file.
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
+    #[command(flatten)]
+    arm: program::Arm,
     /// Folder of the dataset.
     #[arg(long)]
     data: PathBuf,
     /// Scenario that the dataset was made of: what `datagen` was given.
     #[arg(long, default_value = "training")]
     scenario: String,
-    /// Scenario entries that `datagen` was given: key=value.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: program::Overrides,
     /// Folder of the arrays, starts.f32, and of what they are, starts.json.
     #[arg(long)]
     out: PathBuf,
-    /// Worker threads [default: all cores]; the arrays do not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    work: program::Threads,
+    #[command(flatten)]
+    project: program::Project,
 }
 
 const EXAMPLES: &str = "\
@@ -62,13 +58,13 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = scenario::project_root(arguments.root.as_deref())?;
-    rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0) as usize).build_global()?;
+    let root = scenario::project_root(arguments.project.root.as_deref())?;
+    rayon::ThreadPoolBuilder::new().num_threads(arguments.work.count()).build_global()?;
     let reader = Reader::open(&arguments.data)?;
     let selection = Selection {
         domain: arguments.scenario.clone(),
-        robot: arguments.robot.clone(),
-        set: arguments.set.clone(),
+        robot: arguments.arm.robot.clone(),
+        set: arguments.overrides.set.clone(),
         ..Selection::new(&root)
     };
     let scenario = selection.load()?;

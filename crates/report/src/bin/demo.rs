@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use agent::{Method, Network};
-use anyhow::{Context as _, Result};
+use anyhow::{Context as _, Result, ensure};
 use clap::Parser;
 use experiments::{TrialRecord, play_watched};
 use pomdp::Seed;
@@ -22,9 +22,8 @@ struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
     #[arg(long, default_value = "D4")]
     domain: String,
-    /// Arm: sawyer, jaco, or a robot file (docs/src/guides/arm.md).
-    #[arg(long, default_value = "sawyer")]
-    robot: String,
+    #[command(flatten)]
+    arm: program::Arm,
     /// Preset of belief and planner: surmise, paper, or a file.
     #[arg(long, default_value = scenario::PRESET)]
     preset: String,
@@ -38,24 +37,21 @@ struct Arguments {
     /// its way.
     #[arg(long, default_value_t = 1)]
     trial: u32,
-    /// Worker threads of search and belief [default: all cores]; the episode does not depend on it.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    work: program::Threads,
     /// Small budgets: a glance whose result means nothing.
     #[arg(long)]
     quick: bool,
-    /// Overrides a scenario entry: key=value.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    set: Vec<String>,
+    #[command(flatten)]
+    overrides: program::Overrides,
     /// Folder of the trained prior [default: the one trained here with the same --quick, else the shipped one].
     #[arg(long)]
     prior: Option<PathBuf>,
     /// Folder of the results [default: runs/demo/DOMAIN-ROBOT-PRESET-METHOD, with -seed-SEED-trial-TRIAL behind it for another world than the usual one; runs/quick/demo/… with --quick].
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Project folder [default: the nearest one above with scenarios/base.toml].
-    #[arg(long)]
-    root: Option<PathBuf>,
+    #[command(flatten)]
+    project: program::Project,
     /// Prints the record of the trial as JSON.
     #[arg(long)]
     json: bool,
@@ -74,18 +70,18 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let root = scenario::project_root(arguments.root.as_deref())?;
+    let root = scenario::project_root(arguments.project.root.as_deref())?;
     let selection = Selection {
         root: root.clone(),
         domain: arguments.domain.clone(),
-        robot: arguments.robot.clone(),
+        robot: arguments.arm.robot.clone(),
         preset: arguments.preset.clone(),
         quick: arguments.quick,
-        set: arguments.set.clone(),
+        set: arguments.overrides.set.clone(),
         effects: None,
     };
     let mut scenario = selection.load()?;
-    scenario.planner.threads = start_threads(arguments.threads).context(FAILED)?;
+    scenario.planner.threads = start_threads(arguments.work).context(FAILED)?;
     let scenario = scenario;
     let problem = Problem::assemble(&scenario, &root)?;
     let method = arguments.method.unwrap_or(match scenario.belief.filter {
@@ -93,6 +89,11 @@ fn run(arguments: &Arguments) -> Result<()> {
         scenario::Filter::Rejection => Method::RnnSampling,
     });
     let default = || Network::default_folder(&root, &problem, arguments.quick);
+    ensure!(
+        method.needs_prior() || arguments.prior.is_none(),
+        "--prior: method {} uses no network: leave it out, or choose another --method",
+        method.name()
+    );
     let folder = method.needs_prior().then(|| arguments.prior.clone().unwrap_or_else(default));
     let prior = folder.map(|folder| Network::load(&folder, &problem)).transpose()?;
     // What the method cannot do is said before a folder is made.
@@ -140,9 +141,9 @@ fn taken(error: &whole_file::Error) -> anyhow::Error {
 }
 
 /// Starts the threads that simulate particles, and says how many trees are searched at a time.
-fn start_threads(asked: Option<u32>) -> Result<usize> {
-    // 0 is for all cores. What the search does with more threads than it has trees is nothing.
-    rayon::ThreadPoolBuilder::new().num_threads(asked.unwrap_or(0) as usize).build_global()?;
+fn start_threads(asked: program::Threads) -> Result<usize> {
+    // What the search does with more threads than it has trees is nothing.
+    rayon::ThreadPoolBuilder::new().num_threads(asked.count()).build_global()?;
     Ok(rayon::current_num_threads())
 }
 
@@ -150,7 +151,7 @@ fn start_threads(asked: Option<u32>) -> Result<usize> {
 fn suggest_next(arguments: &Arguments, out: &Path) {
     program::say!("open {} in a browser to see it step by step", typed(&out.join("episode.html")));
     let mut eval: Vec<String> = ["cargo", "xtask", "eval", "--domain", &arguments.domain].map(String::from).to_vec();
-    let chosen = [("--robot", &arguments.robot, "sawyer"), ("--preset", &arguments.preset, scenario::PRESET)];
+    let chosen = [("--robot", &arguments.arm.robot, "sawyer"), ("--preset", &arguments.preset, scenario::PRESET)];
     for (option, value, usual) in chosen {
         if value != usual {
             eval.extend([option.to_string(), value.clone()]);
@@ -166,7 +167,7 @@ fn suggest_next(arguments: &Arguments, out: &Path) {
         eval.extend(["--prior".into(), typed(prior)]);
     }
     eval.extend(arguments.quick.then(|| "--quick".into()));
-    eval.extend(arguments.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
+    eval.extend(arguments.overrides.set.iter().flat_map(|set| ["--set".to_string(), set.clone()]));
     eval.extend(["--trials".to_string(), "10".into()]);
     let rerun = ["cargo".to_string(), "xtask".into(), "rerun".into(), typed(out)];
     program::next(&[
