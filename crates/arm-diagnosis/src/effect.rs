@@ -50,17 +50,23 @@ effects! {
         ["coulomb" "N m", "viscous" "N m s/rad"]
         shows "Motion both ways through the same angles, at two speeds or more"
         like ["torque_offset": "reverse: friction changes its sign, an offset does not",
-            "command_delay": "compare joints: a delay is the same in all, friction is not"];
+            "command_delay": "compare joints: a delay is the same in all, friction is not",
+            "stribeck_friction": "add speeds below 0.1 rad/s",
+            "load_friction": "repeat the same motion with another load",
+            "drifting_friction": "record for longer, from a cold start"];
     joint "stribeck_friction" "friction that is higher at low speed: + F_s exp(−|v/v_s|^α) sgn(v)"
         ["coulomb" "N m", "viscous" "N m s/rad", "peak" "N m", "stribeck_rate" "rad/s", "curvature" "1"]
         shows "Slow motion both ways, below 0.3 rad/s, beside faster motion"
         like ["presliding": "reverse within a few mrad: presliding follows the angle, the Stribeck effect the speed",
-            "joint_friction": "add speeds below 0.1 rad/s"];
+            "joint_friction": "add speeds below 0.1 rad/s",
+            "stribeck_load_friction": "repeat the slow motion with another load"];
     joint "load_friction" "friction that grows with the torque that the joint passes on: + c |τ| sgn(v)"
         ["coulomb" "N m", "viscous" "N m s/rad", "load" "1"]
         shows "The same motion with little and with much load: the arm folded and stretched, with and without a payload"
         like ["torque_gain": "reverse: friction changes its sign, a gain's error follows the load",
-            "joint_friction": "repeat the same motion with another load"];
+            "joint_friction": "repeat the same motion with another load",
+            "directional_friction": "lift and lower the same load",
+            "stribeck_load_friction": "add speeds below 0.1 rad/s"];
     joint "directional_friction" "friction with load that is another one where the load drives the joint than where the motor does"
         ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1"]
         shows "Lifting and lowering the same load, at the same speeds"
@@ -70,19 +76,20 @@ effects! {
         ["coulomb" "N m", "viscous" "N m s/rad", "load" "1", "peak" "N m", "load_peak" "1", "stribeck_rate" "rad/s", "curvature" "1"]
         shows "Slow and fast motion with several loads"
         like ["stribeck_friction": "repeat the slow motion with another load",
-            "load_friction": "add speeds below 0.1 rad/s"];
-    joint "stribeck_directional_friction" "the same, with shares of load that differ by whether load or motor drives the joint"
+            "load_friction": "add speeds below 0.1 rad/s",
+            "stribeck_directional_friction": "lift and lower the same loads slowly"];
+    joint "stribeck_directional_friction" "friction with load that is higher at low speed, with shares of load that differ by whether load or motor drives the joint"
         ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1", "peak" "N m", "driving_peak" "1", "driven_peak" "1",
             "stribeck_rate" "rad/s", "curvature" "1"]
         shows "Lifting and lowering several loads, slowly and fast"
         like ["stribeck_load_friction": "lift and lower the same loads slowly",
             "quadratic_load_friction": "lift and lower three loads or more slowly"];
-    joint "quadratic_load_friction" "the same, with the square of the load at low speed: + d τ² exp(−|v/v_s|^α) sgn(v), by direction"
+    joint "quadratic_load_friction" "friction with load and its square at low speed, + d τ² exp(−|v/v_s|^α) sgn(v), by whether load or motor drives the joint"
         ["coulomb" "N m", "viscous" "N m s/rad", "driving" "1", "driven" "1", "peak" "N m", "driving_peak" "1", "driven_peak" "1",
             "driving_square" "1/(N m)", "driven_square" "1/(N m)", "stribeck_rate" "rad/s", "curvature" "1"]
         shows "Lifting and lowering three loads or more, slowly and fast"
         like ["stribeck_directional_friction": "lift and lower three loads or more slowly"];
-    joint "drifting_friction" "friction that changes with time, as by warmth: F(t) = F (1 + …)"
+    joint "drifting_friction" "friction that changes with time, as by warmth: F + ΔF (1 − exp(−t/T))"
         ["coulomb" "N m", "viscous" "N m s/rad", "coulomb_change" "N m", "viscous_change" "N m s/rad", "time_constant" "s"]
         shows "The same motion from a cold start on, over minutes"
         like ["torque_drift": "reverse: friction changes its sign, a drifting reading does not",
@@ -106,12 +113,14 @@ effects! {
         shows "Large torques that are known well, such as those of gravity on a stretched arm"
         like ["payload": "compare joints: a payload shows in all joints before it, a gain in one",
             "load_friction": "reverse: friction changes its sign, a gain's error follows the load",
-            "gravity_compensation": "accelerate strongly: a gain scales those torques too"];
+            "gravity_compensation": "accelerate strongly: a gain scales those torques too",
+            "directional_friction": "give torque constants to 2 % or better: the difference of lifting and lowering is a share of the torque, as a gain's error is"];
     joint "torque_offset" "torque that is read with an offset"
         ["offset" "N m"]
         shows "Motion both ways through poses of different load"
         like ["encoder_offset": "turn the joint far: the error of a wrong angle changes with the pose",
-            "torque_drift": "repeat the same poses at the end of the log"];
+            "torque_drift": "repeat the same poses at the end of the log",
+            "joint_friction": "reverse: friction changes its sign, an offset does not"];
     joint "torque_drift" "torque whose reading drifts with time"
         ["offset" "N m", "rate" "N m/s"]
         shows "The same poses at the beginning and at the end of a log of minutes"
@@ -124,7 +133,7 @@ effects! {
     joint "encoder_offset" "angle that is read with an offset"
         ["offset" "rad"]
         shows "Poses that differ in this joint, with a load on it"
-        like ["base_tilt": "compare joints: a tilt shows in every joint that carries a weight",
+        like ["base_tilt": "turn the first joint: what a tilt does depends on its angle, what a wrong angle of another joint does, does not",
             "torque_offset": "turn the joint far: the error of a wrong angle changes with the pose"];
     joint "encoder_eccentricity" "angle whose reading errs with the angle itself: a sin(q + φ)"
         ["amplitude" "rad", "phase" "rad"]
@@ -134,7 +143,8 @@ effects! {
         ["stiffness" "N m/rad"]
         shows "Quick changes of the load, angles read at the motor"
         like ["backlash": "keep the load on one side: play then stays closed, an elastic gear still gives",
-            "presliding": "change the load at a joint that stands: a gear gives, presliding does not"];
+            "presliding": "change the load at a joint that stands: a gear gives, presliding does not",
+            "torque_delay": "compare joints: a delay is the same in all, an elastic gear is not"];
     joint "backlash" "gear with play, with the angle read on the motor's side"
         ["play" "rad"]
         shows "A load that changes its sign, angles read at the motor"
@@ -157,11 +167,13 @@ effects! {
         ["mass" "kg", "com_x" "m", "com_y" "m", "com_z" "m"]
         shows "Poses with the tip at several distances from each joint, held still and accelerated"
         like ["torque_gain": "compare joints: a payload shows in all joints before it, a gain in one",
-            "base_tilt": "turn the first joint: what a tilt does depends on its angle"];
+            "base_tilt": "turn the first joint: what a tilt does depends on its angle",
+            "reflected_inertia": "hold still in several poses: a payload has a weight",
+            "servo_gain": "compare joints: a payload shows in all joints before it, a gain in one"];
     arm "base_tilt" "gravity that is not along the base's −z"
         ["slope_x" "rad", "slope_y" "rad"]
         shows "Poses that differ in the first joint, with the arm stretched"
-        like ["encoder_offset": "compare joints: a tilt shows in every joint that carries a weight",
+        like ["encoder_offset": "turn the first joint: what a tilt does depends on its angle, what a wrong angle of another joint does, does not",
             "payload": "turn the first joint: what a tilt does depends on its angle"];
     arm "gravity_compensation" "torques from which a share of gravity's has been taken out"
         ["share" "1"]
@@ -254,6 +266,8 @@ mod tests {
             for (other, tell) in effect.look_alikes {
                 assert!(Effect::find(other).is_some() && *other != effect.name, "{}: {other}", effect.name);
                 assert!(!tell.is_empty(), "{}: {other}", effect.name);
+                let back = Effect::find(other).unwrap().look_alikes;
+                assert!(back.contains(&(effect.name, tell)), "{other} does not say so of {}", effect.name);
             }
         }
     }

@@ -79,12 +79,12 @@ impl<'a> Report<'a> {
         }
         let heldout = &diagnosis.heldout;
         lines.push(format!(
-            "  held out ({} of {} pieces): {:.2} to {:.2} variances of noise; {:.0} % of the squared torque error is gone",
+            "  held out ({} of {} pieces): {:.2} to {:.2} variances of noise; {:.1} % of the squared torque error is gone",
             heldout.pieces[1],
             heldout.pieces[0] + heldout.pieces[1],
             heldout.before,
             heldout.after,
-            100.0 * heldout.closed_fraction
+            (1e3 * heldout.closed_fraction).floor() / 10.0
         ));
         if diagnosis.mass_uncertainty > 1.5 {
             lines.push(format!(

@@ -68,7 +68,7 @@ enum What {
         #[arg(long, default_value = "D4")]
         domain: String,
         /// How far the object is moved along y, m.
-        #[arg(long, default_value_t = 1e-8)]
+        #[arg(long, default_value_t = 1e-8, value_parser = length)]
         nudge_m: f64,
         /// Overrides a scenario entry: key=value.
         #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -169,6 +169,12 @@ enum What {
         #[arg(long = "set", value_name = "KEY=VALUE")]
         set: Vec<String>,
     },
+}
+
+/// A length on the command line.
+fn length(text: &str) -> Result<f64, String> {
+    let good = |length: &f64| length.is_finite() && *length > 0.0;
+    text.parse().ok().filter(good).ok_or_else(|| format!("expected a length above 0, in m, found `{text}`"))
 }
 
 const EXAMPLES: &str = "\

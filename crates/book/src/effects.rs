@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Result;
-use discrepancy::listing::{Entry, effects};
+use discrepancy::listing::{Entry, NEVER_NAMED, effects};
 use physics_model::EffectKind;
 use scenario::{Problem, Selection};
 
@@ -34,7 +34,7 @@ fn introduction(entries: &[Entry]) -> String {
         .map(|entry| vec![format!("[`{0}`](#{0})", entry.effect.name), cell(&entry.effect.summary)])
         .collect();
     format!(
-        "{MADE}\n# Effects\n\nThis page describes the {} physical effects that a scenario can add and that `diagnose` can name.\n\n\
+        "{MADE}\n# Effects\n\nThis page describes the {} physical effects that a scenario can add. `diagnose` can name all but `contact_compliance`.\n\n\
          Each picture shows one push with the effect and without it. A box of 8 × 6 × 5 cm and 0.5 kg lies on a table with friction 0.3. A ball of \
          2 cm radius pushes it by 12 cm at 0.3 m/s, stops, waits, and moves back by 4 cm. What is drawn is what the sensors read, without noise. Forces above 4 N, such as the knock at contact onset, are cut off. Where another \
          scene shows an effect better, the line under the picture says so. \
@@ -66,6 +66,9 @@ fn section(entry: &Entry, caption: &str) -> String {
         escaped(&effect.acts),
         name = effect.name,
     );
+    if !entry.named {
+        text += &format!("\n{NEVER_NAMED}\n");
+    }
     for other in &entry.look_alikes {
         text += &format!("\n- Looks like [{0}](#{0}). To tell: {1}.", other.name, escaped(other.tell_apart));
     }

@@ -11,6 +11,8 @@ use crate::separate::look_alikes;
 pub struct Entry {
     /// What the docs of the effect say.
     pub effect: Sheet,
+    /// Whether a diagnosis names it. How stiff contacts are is re-tuned and told, and is no effect.
+    pub named: bool,
     /// Effects that leave similar traces, and how to tell them apart.
     pub look_alikes: Vec<LookAlike>,
 }
@@ -57,10 +59,13 @@ pub fn list() -> List {
 pub fn effects() -> Vec<Entry> {
     let entry = |kind: &EffectKind| {
         let look_alikes = look_alikes(kind.name()).map(|(name, tell_apart)| LookAlike { name, tell_apart });
-        Entry { effect: kind.sheet(), look_alikes: look_alikes.collect() }
+        Entry { effect: kind.sheet(), named: crate::candidate::is_named(*kind), look_alikes: look_alikes.collect() }
     };
     EffectKind::ALL.iter().map(entry).collect()
 }
+
+/// Said of what is re-tuned.
+pub const NEVER_NAMED: &str = "Re-tuned and told by a diagnosis, never named: contacts of engines differ by as much.";
 
 /// Columns of a line of text.
 const COLUMNS: usize = 100;
@@ -81,6 +86,9 @@ pub fn text() -> String {
             say(&format!("{} = {}{unit}: {}{neutral}", row.symbol, row.keys.join(", "), row.plausible));
         }
         say(&effect.shows);
+        if !entry.named {
+            say(NEVER_NAMED);
+        }
         for other in &entry.look_alikes {
             say(&format!("Looks like {}. To tell: {}.", other.name, other.tell_apart));
         }

@@ -57,7 +57,7 @@ impl Report {
             let by = (value.value - mean).abs() / stddev;
             (by > FAR && by.is_finite() && mean.is_finite()).then(|| {
                 format!(
-                    "Re-tuning has moved {} to {:.3}, {by:.0} standard deviations from the {mean:.3} of log.toml: check it.",
+                    "Re-tuning has moved {} to {:.3}, {by:.0} standard deviations from the {mean:.3} of log.toml: check it. Contacts that are unlike the engine's can do that too.",
                     value.key, value.value
                 )
             })

@@ -33,11 +33,21 @@ const PAIRS: &[(&str, &str, &str)] = &[
     ),
     ("force_delay", "actuation_delay", "look at when the object starts to move: a late force does not shift it"),
     ("force_delay", "pose_delay", "compare with the tool's place at the first contact: only one of the two is late"),
-    ("static_friction", "adhesion", "vary how long tool and object rest together, then pull away"),
-    ("static_friction", "backlash", "vary how long tool and object rest together, then reverse slowly"),
+    ("static_friction", "adhesion", "pull the tool back: what sticks to it follows, and the wrist is pulled"),
+    (
+        "static_friction",
+        "backlash",
+        "watch the wrist at reversals: with play the tool stands without a force, with static friction the force grows",
+    ),
     ("anisotropic_friction", "table_tilt", "push in eight directions: tilt has one period per turn, anisotropy two"),
     ("friction_patch", "mass_leak", "repeat the same push elsewhere on the table"),
     ("tether", "friction_patch", "begin at different places: a tether grows with distance"),
+    ("tether", "table_tilt", "begin far apart: a tether pulls towards one place, a tilt the same way everywhere"),
+    (
+        "tether",
+        "constant_force",
+        "begin far apart: a tether pulls towards one place, a constant force the same way everywhere",
+    ),
     (
         "edge_rounding",
         "contact_compliance",
@@ -93,7 +103,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
     (
         "rolling_resistance",
         "viscous_damping",
-        "let it roll with and without a known weight: only rolling resistance scales",
+        "let it roll with and without a known weight: damping slows a heavier one less, rolling resistance as much",
     ),
     ("hidden_obstacle", "friction_patch", "cross the place from all sides: a body stops the object, a patch slows it"),
     (

@@ -170,7 +170,7 @@ fn results_are_not_written_over_the_model_and_not_where_they_cannot_be() {
     let (code, message) = run(taken.path(), &[]);
     assert!(code == Some(2) && message.contains("report.html") && message.contains("found a folder"), "{message}");
     let (code, message) = run(&taken.path().join("out"), &["--threads", "100000"]);
-    assert!(code == Some(2) && message.contains("expected a whole number, 0 to 1024, found `100000`"), "{message}");
+    assert!(code == Some(2) && message.contains("expected a whole number, 1 to 4096, found `100000`"), "{message}");
 }
 
 /// A log of a Sawyer whose joints follow one another around, beside an object that rests.

@@ -19,7 +19,7 @@ use scenario::Selection;
 #[command(group = clap::ArgGroup::new("worlds_elsewhere").args(["world", "all"]).multiple(true))]
 struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
-    #[arg(long, required_unless_present = "all")]
+    #[arg(long, required_unless_present_any = ["all", "only", "publish", "keep_finished"])]
     domain: Option<String>,
     /// Plays all tables of scenarios/tables, and draws their pictures.
     #[arg(long, conflicts_with_all = ["domain", "robot", "preset", "methods", "world", "executor", "worker"])]
@@ -67,9 +67,9 @@ struct Arguments {
     /// Who plays: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
-    /// Number of tasks that slurm or hq cut the trials into [default: 20].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    shards: Option<u32>,
+    /// Number of tasks that slurm or hq cut the trials into.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    shards: u32,
     /// Plays only this shard, as the tasks of an array do. The command without --worker makes the tables.
     #[arg(long, value_name = "SHARD")]
     worker: Option<u32>,
@@ -94,12 +94,6 @@ struct Arguments {
     /// Prints the table as JSON.
     #[arg(long)]
     json: bool,
-}
-
-impl Arguments {
-    fn shards(&self) -> u32 {
-        self.shards.unwrap_or(20)
-    }
 }
 
 const EXAMPLES: &str = "\
@@ -134,7 +128,7 @@ fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
         root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(evaluation.name())
     });
     if let Some(index) = arguments.worker {
-        let run = evaluation.open_worker(&out, Shard { index, of: arguments.shards() })?;
+        let run = evaluation.open_worker(&out, Shard { index, of: arguments.shards })?;
         let interrupted = program::interrupts()?;
         let player = Player { threads: Some(arguments.work.threads.unwrap_or(1)), interrupted: &interrupted };
         return player.play(&evaluation, &run).context(FAILED);
@@ -254,11 +248,8 @@ fn request(arguments: &Arguments, root: &Path, domain: &str) -> Request {
 
 /// What no array can do.
 fn check_shards(arguments: &Arguments) -> Result<()> {
-    if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards()) {
-        bail!("--worker: expected a shard below {}, found {shard}", arguments.shards());
-    }
-    if arguments.shards.is_some() && arguments.worker.is_none() && matches!(arguments.executor, Executor::Local) {
-        bail!("--shards: only tasks of slurm or hq have shards: add --executor slurm or --executor hq");
+    if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards) {
+        bail!("--worker: expected a shard below {}, found {shard}", arguments.shards);
     }
     if let (Executor::Engine(_), Some(WorldAddress::Tcp(_))) = (arguments.executor, &arguments.world) {
         bail!(
@@ -282,7 +273,7 @@ fn submit(engine: Engine, run: &Run, arguments: &Arguments, interrupted: &Atomic
             finished = now;
         }
     };
-    let played = run.play_on(engine, arguments.shards(), arguments.work.threads.unwrap_or(1), interrupted, &mut report);
+    let played = run.play_on(engine, arguments.shards, arguments.work.threads.unwrap_or(1), interrupted, &mut report);
     match played {
         Ok(outcome) => Ok(outcome == Outcome::Finished),
         // The rest is of the kind that is said before anything is played.

@@ -85,7 +85,9 @@ fn run(arguments: &Arguments) -> Result<bool> {
 
     let robot = &arguments.arm.robot;
     let reader = Reader::open(&data).with_context(|| {
-        format!("{}: no usable dataset, make one with `cargo xtask datagen --robot {robot}`", data.display())
+        let quick = if arguments.quick { " --quick" } else { "" };
+        let out = typed(&data);
+        format!("{out}: no usable dataset, make one with `cargo xtask datagen --robot {robot}{quick} --out {out}`")
     })?;
     let manifest = reader.manifest().clone();
     if manifest.schema.robot != name {

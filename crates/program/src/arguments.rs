@@ -41,8 +41,13 @@ fn with_negative_numbers(command: Command) -> Command {
     command.mut_subcommands(with_negative_numbers)
 }
 
-/// What is wrong with a value; `None` for all else, which clap says in its own words.
+/// What is wrong with a value, or lacks, in one sentence; `None` for all else, which clap says in its own words.
 fn sentence(error: &Error) -> Option<String> {
+    if let (ErrorKind::MissingRequiredArgument, Some(ContextValue::Strings(missing))) =
+        (error.kind(), error.get(ContextKind::InvalidArg))
+    {
+        return Some(format!("expected {}, found none; --help says more", missing.join(" and ")));
+    }
     if error.kind() != ErrorKind::ValueValidation {
         return None;
     }
@@ -147,6 +152,8 @@ mod tests {
         let good = read_line("--trial 3 --seed 2 --threads 4 --sets 1 --share -0.5 play --times 2").unwrap();
         assert_eq!((good.trial, good.seed, good.threads, good.sets, good.share), (3, 2, Some(4), Some(1), -0.5));
         assert!(matches!(good.inner, Some(Inner::Play { times: 2 })) && good.fold.is_none());
+        let error = read_line("play").unwrap_err();
+        assert_eq!(sentence(&error).as_deref(), Some("expected --times <TIMES>, found none; --help says more"));
         for line in ["--nothing", "--help", "nowhere", "--trial"] {
             assert_eq!(sentence(&read_line(line).unwrap_err()), None, "{line}");
         }

@@ -165,6 +165,13 @@ fn toml_problem(text: &str, error: &toml::de::Error) -> String {
 /// What a model that `diagnose` wrote says to a scenario: the effects. The rest is about the object of its log.
 fn read_effects(path: &Path) -> Result<Table, Error> {
     let mut table = read(path)?;
+    if table.contains_key("effect") {
+        return Err(Error::Key {
+            file: path.display().to_string(),
+            key: "effect".into(),
+            message: "found a model of an arm's joints, expected one of pushes: the planner has no use for it".into(),
+        });
+    }
     let missing = || Error::Key {
         file: path.display().to_string(),
         key: "effects.model".into(),

@@ -97,6 +97,10 @@ def try_log(rng, engine, variant, simulate=simulate, draws=wide):
         if {"mass_leak", "force_drift"} & set(effects):
             rig.episodes = min(rig.episodes, 24)
         plan = draw_plan(rng, scene, rig)
+        if "hidden_obstacle" in effects:
+            plan = [episode for episode in plan if begins_free(scene, episode, effects["hidden_obstacle"])]
+            if len(plan) < rig.episodes / 2:
+                continue
         thin(rig, plan)
         for episode in plan:
             episode.tick_s = rig.period_s if episode.tick_s else 0.0
@@ -120,6 +124,14 @@ def try_log(rng, engine, variant, simulate=simulate, draws=wide):
                     each[name] = compared([traces[i] for i in some], rest, [stamps[i] for i in some], effects, rig, others)
             return rng, scene, rig, kind, effects, plan, stamps, traces, seen, each
     raise Faint(f"no effect of kind {kind} shows in 12 draws")
+
+
+def begins_free(scene, episode, obstacle):
+    """Whether object and tool begin an episode beside the body in the way: engines throw apart what begins in one another."""
+    x, y, radius = obstacle["x_m"], obstacle["y_m"], obstacle["size_0_m"]
+    object_m = math.hypot(*scene.half_sizes_m[:2]) if scene.shape == "box" else max(scene.half_sizes_m)
+    tool = [] if episode.course is None else [(episode.places(np.zeros(1))[0], scene.tool_radius_m)]
+    return all(math.hypot(at[0] - x, at[1] - y) > radius + own for at, own in [(episode.pose, object_m), *tool])
 
 
 def probe(bare, full, plan, stamps, some, effects, rig):

@@ -33,7 +33,7 @@ impl Help {
         own.map(|option| {
             let values = match &option.values[..] {
                 [] => String::new(),
-                values => format!(" Values: {}.", values.join(", ")),
+                values => format!(". Values: {}", values.join(", ")),
             };
             (option.usage.clone(), format!("{}{values}", option.about))
         })
@@ -107,8 +107,9 @@ pub(crate) fn parse(text: &str) -> Help {
     }
     for option in &mut help.options {
         if let Some((about, values)) = option.about.clone().split_once("[possible values: ") {
-            option.values = values.split(']').next().unwrap_or_default().split(", ").map(String::from).collect();
-            option.about = about.trim().to_string();
+            let (values, rest) = values.split_once(']').unwrap_or((values, ""));
+            option.values = values.split(", ").map(String::from).collect();
+            option.about = [about.trim(), rest.trim()].join(" ").trim().to_string();
         } else if let Some((about, values)) = option.about.clone().split_once("Possible values:") {
             // One a line, with what it means: `- local: on this machine`.
             let names = values.split("- ").filter_map(|value| value.split(':').next());

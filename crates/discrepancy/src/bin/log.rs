@@ -250,6 +250,10 @@ fn print(log: &Log, check: &Check, sentences: &[String]) {
     }
     if sentences.is_empty() {
         program::out!("Nothing looks wrong.");
+    } else {
+        program::out!(
+            "`cargo xtask log check LOG --fix NEW` writes a copy in which what can be mended is (docs/src/guides/check.md)."
+        );
     }
     for what in &check.not_told {
         program::out!("This log does not tell {what}.");
