@@ -89,7 +89,7 @@ effects! {
             "driving_square" "1/(N m)", "driven_square" "1/(N m)", "stribeck_rate" "rad/s", "curvature" "1"]
         shows "Lifting and lowering three loads or more, slowly and fast"
         like ["stribeck_directional_friction": "lift and lower three loads or more slowly"];
-    joint "drifting_friction" "friction that changes with time, as by warmth: F + ΔF (1 − exp(−t/T))"
+    joint "drifting_friction" "friction that changes with time, as by warmth: F + ΔF (1 − exp(−t/T)) / (1 − exp(−L/T)) in a log of length L"
         ["coulomb" "N m", "viscous" "N m s/rad", "coulomb_change" "N m", "viscous_change" "N m s/rad", "time_constant" "s"]
         shows "The same motion from a cold start on, over minutes"
         like ["torque_drift": "reverse: friction changes its sign, a drifting reading does not",
@@ -97,7 +97,7 @@ effects! {
     joint "presliding" "friction that builds up over a small angle after each reversal (Dahl)"
         ["viscous" "N m s/rad", "coulomb" "N m", "build_up" "rad"]
         shows "Reversals, and motion back and forth over less than 20 mrad"
-        like ["joint_elasticity": "change the load at a joint that stands: a gear gives, presliding does not",
+        like ["joint_elasticity": "load a joint that stands: with presliding the motor turns a little, and an elastic gear gives where the motor does not see it",
             "backlash": "reverse under a load of one sign: play stays closed, presliding shows",
             "stribeck_friction": "reverse within a few mrad: presliding follows the angle, the Stribeck effect the speed"];
     joint "reflected_inertia" "inertia of the motor, seen through the gear"
@@ -143,7 +143,7 @@ effects! {
         ["stiffness" "N m/rad"]
         shows "Quick changes of the load, angles read at the motor"
         like ["backlash": "keep the load on one side: play then stays closed, an elastic gear still gives",
-            "presliding": "change the load at a joint that stands: a gear gives, presliding does not",
+            "presliding": "load a joint that stands: with presliding the motor turns a little, and an elastic gear gives where the motor does not see it",
             "torque_delay": "compare joints: a delay is the same in all, an elastic gear is not"];
     joint "backlash" "gear with play, with the angle read on the motor's side"
         ["play" "rad"]
@@ -205,6 +205,7 @@ impl Effect {
             (_, "inertia") => "up to about the joint's own",
             (_, "phase") => "−π to π",
             (_, "cycles") => "1 to 120 a turn",
+            ("servo_gain", "gain") => "about 0.7 to 1.7",
             (_, "gain") => "within about 0.4 of 1",
             (_, "rate") => "within about 20 % of the usual torque, over the log",
             (_, "limit") => "what 3 to 50 % of the commanded torques exceed",

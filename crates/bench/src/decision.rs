@@ -114,7 +114,7 @@ pub fn run(root: &Path, task: &Task, note: impl Fn(&str) + Sync) -> Result<Value
     let mut scenario = from.selection(root, "surmise").load()?;
     let pool =
         rayon::ThreadPoolBuilder::new().num_threads(task.threads).build().context("cannot start so many threads")?;
-    scenario.planner.threads = pool.current_num_threads();
+    scenario.planner.threads = pool.current_num_threads().min(1024);
     let problem = Problem::assemble(&scenario, root)?;
     let network = Network::load(&Network::default_folder(root, &problem, false), &problem)?;
     let mut parts = pool.install(|| {

@@ -38,18 +38,43 @@ pub struct List {
 /// An effect of a joint or an arm.
 #[derive(Serialize)]
 pub struct JointEntry {
-    /// What is known of it.
-    pub effect: &'static arm_diagnosis::Effect,
-    /// Where each of its values is expected.
-    pub plausible: Vec<&'static str>,
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub summary: &'static str,
+    /// Whether it is of one joint, rather than of the whole arm.
+    pub of_joint: bool,
+    /// Its values.
+    pub parameters: Vec<JointParameter>,
+    /// Motion that shows it.
+    pub shows: &'static str,
+    /// Effects that leave similar traces.
+    pub look_alikes: Vec<LookAlike>,
 }
 
-/// All that can be named.
+/// A value of such an effect.
+#[derive(Serialize)]
+pub struct JointParameter {
+    /// Its name.
+    pub name: &'static str,
+    /// SI; of a joint that turns.
+    pub unit: &'static str,
+    /// Where it is expected.
+    pub plausible: &'static str,
+}
+
+/// All effects, of objects and of joints.
 #[must_use]
 pub fn list() -> List {
-    let joint = |effect: &'static arm_diagnosis::Effect| {
-        let plausible = effect.parameters.iter().map(|value| effect.plausible(value)).collect();
-        JointEntry { effect, plausible }
+    let joint = |effect: &arm_diagnosis::Effect| JointEntry {
+        name: effect.name,
+        summary: effect.summary,
+        of_joint: effect.of_joint,
+        parameters: (effect.parameters.iter())
+            .map(|value| JointParameter { name: value.name, unit: value.unit, plausible: effect.plausible(value) })
+            .collect(),
+        shows: effect.shows,
+        look_alikes: effect.look_alikes.iter().map(|(name, tell_apart)| LookAlike { name, tell_apart }).collect(),
     };
     List { effects: effects(), joint_effects: arm_diagnosis::EFFECTS.iter().map(joint).collect() }
 }

@@ -37,7 +37,7 @@ const PAIRS: &[(&str, &str, &str)] = &[
     (
         "static_friction",
         "backlash",
-        "watch the wrist at reversals: with play the tool stands without a force, with static friction the force grows",
+        "watch where a push begins again: static friction asks for a larger force first, with play the tool lags behind its command",
     ),
     ("anisotropic_friction", "table_tilt", "push in eight directions: tilt has one period per turn, anisotropy two"),
     ("friction_patch", "mass_leak", "repeat the same push elsewhere on the table"),

@@ -20,12 +20,6 @@ pub enum Error {
     /// The world cannot be used.
     #[error(transparent)]
     World(#[from] agent::WorldError),
-    /// A network that no method asks.
-    #[error("--prior {}: none of the methods uses a network: leave it out, or choose other --methods", .folder.display())]
-    UnusedPrior {
-        /// Its folder.
-        folder: PathBuf,
-    },
     /// No threads to play on.
     #[error("the threads that play trials cannot be started")]
     Threads(#[from] rayon::ThreadPoolBuildError),

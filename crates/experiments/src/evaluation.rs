@@ -56,9 +56,6 @@ impl Evaluation {
         let problem = Arc::new(Problem::assemble(&scenario, root)?);
         let default = || Network::default_folder(root, &problem, request.selection.quick);
         let needs_prior = methods.iter().any(|method| method.needs_prior());
-        if let Some(folder) = request.prior.as_ref().filter(|_| !needs_prior) {
-            return Err(Error::UnusedPrior { folder: folder.clone() });
-        }
         let prior_folder = needs_prior.then(|| request.prior.clone().unwrap_or_else(default));
         let load = |folder: &PathBuf| Network::load(folder, &problem);
         let prior = prior_folder.as_ref().map(load).transpose()?;

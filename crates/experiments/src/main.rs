@@ -16,10 +16,9 @@ use scenario::Selection;
 /// Plays trials of methods on a domain, or all tables with --all, and prints the table.
 #[derive(Debug, Parser)]
 #[command(name = "eval", version, after_help = EXAMPLES)]
-#[command(group = clap::ArgGroup::new("worlds_elsewhere").args(["world", "all"]).multiple(true))]
 struct Arguments {
     /// Domain: D1 to D5, obstacle, tilted, or a scenario file.
-    #[arg(long, required_unless_present_any = ["all", "only", "publish", "keep_finished"])]
+    #[arg(long, required_unless_present_any = ["all", "only", "publish", "keep_finished", "python"])]
     domain: Option<String>,
     /// Plays all tables of scenarios/tables, and draws their pictures.
     #[arg(long, conflicts_with_all = ["domain", "robot", "preset", "methods", "world", "executor", "worker"])]
@@ -55,15 +54,15 @@ struct Arguments {
     /// (docs/src/reference/world-protocol.md) on its standard input and output, run without a shell, or tcp://127.0.0.1:PORT.
     #[arg(long, value_name = "COMMAND|ADDRESS")]
     world: Option<WorldAddress>,
-    /// How long a world may take to start and say hello, s.
-    #[arg(long, default_value = "60", value_parser = seconds, requires = "worlds_elsewhere")]
-    world_start_secs: Duration,
-    /// How long a world may take to set up a trial, s.
-    #[arg(long, default_value = "60", value_parser = seconds, requires = "worlds_elsewhere")]
-    world_reset_secs: Duration,
-    /// How long a world may take for an action, s.
-    #[arg(long, default_value = "60", value_parser = seconds, requires = "worlds_elsewhere")]
-    world_act_secs: Duration,
+    /// How long a world may take to start and say hello, s [default: 60].
+    #[arg(long, value_parser = seconds)]
+    world_start_secs: Option<Duration>,
+    /// How long a world may take to set up a trial, s [default: 60].
+    #[arg(long, value_parser = seconds)]
+    world_reset_secs: Option<Duration>,
+    /// How long a world may take for an action, s [default: 60].
+    #[arg(long, value_parser = seconds)]
+    world_act_secs: Option<Duration>,
     /// Who plays: local (threads of this program), slurm (a job array) or hq (HyperQueue): see docs/src/guides/cluster.md.
     #[arg(long, default_value_t = Executor::Local)]
     executor: Executor,
@@ -121,8 +120,12 @@ fn run(arguments: &Arguments) -> Result<bool> {
 
 fn run_one(arguments: &Arguments, root: &Path, domain: &str) -> Result<bool> {
     let evaluation = Evaluation::prepare(&request(arguments, root, domain))?;
-    if let Some(folder) = evaluation.prior_folder() {
-        program::say!("prior: {}", folder.display());
+    match (evaluation.prior_folder(), &arguments.prior) {
+        (Some(folder), _) => program::say!("prior: {}", folder.display()),
+        (None, Some(_)) => {
+            bail!("--prior: none of the methods uses a network: leave it out, or choose other --methods")
+        }
+        (None, None) => {}
     }
     let out = arguments.out.clone().unwrap_or_else(|| {
         root.join(if arguments.quick { "runs/quick/eval" } else { "runs/eval" }).join(evaluation.name())
@@ -222,8 +225,15 @@ fn suggest_report(out: &Path) {
     program::next(&[(report.to_vec(), "makes a page of it: every trial, every failure")]);
 }
 
+/// How long a world may take for each of the three, where nothing is asked for.
+const WORLD_LIMIT: Duration = Duration::from_secs(60);
+
+fn limits(arguments: &Arguments) -> [Option<Duration>; 3] {
+    [arguments.world_start_secs, arguments.world_reset_secs, arguments.world_act_secs]
+}
+
 fn timeouts(arguments: &Arguments) -> Timeouts {
-    let (start, reset, act) = (arguments.world_start_secs, arguments.world_reset_secs, arguments.world_act_secs);
+    let [start, reset, act] = limits(arguments).map(|limit| limit.unwrap_or(WORLD_LIMIT));
     Timeouts { start, reset, act }
 }
 
@@ -248,6 +258,9 @@ fn request(arguments: &Arguments, root: &Path, domain: &str) -> Request {
 
 /// What no array can do.
 fn check_shards(arguments: &Arguments) -> Result<()> {
+    if !arguments.all && arguments.world.is_none() && limits(arguments).iter().any(Option::is_some) {
+        bail!("--world-start-secs, --world-reset-secs and --world-act-secs are limits of a --world, found none");
+    }
     if let Some(shard) = arguments.worker.filter(|shard| *shard >= arguments.shards) {
         bail!("--worker: expected a shard below {}, found {shard}", arguments.shards);
     }

@@ -14,7 +14,7 @@ use crate::{Error, Evaluation, Run, TrialRecord, play, play_external};
 /// How trials are played. Nothing of it changes a result.
 #[derive(Clone, Copy, Debug)]
 pub struct Player<'a> {
-    /// Worker threads, all cores where `None`. Each plays a trial; where all trials share a world behind a socket they search together for the one that is played.
+    /// Worker threads, each of which plays a trial. Where `None`, all cores; they search together for one trial at a time where the world is behind a socket.
     pub threads: Option<u32>,
     /// Set when the run is to stop: trials that have begun end first.
     pub interrupted: &'a AtomicBool,
@@ -37,7 +37,9 @@ impl Player<'_> {
         bar.set_style(ProgressStyle::with_template(style).expect("the template is fixed"));
         bar.enable_steady_tick(Duration::from_millis(200));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads.unwrap_or(0) as usize).build()?;
-        let problem = if evaluation.socket {
+        // One robot behind a socket plays one trial at a time, unless more are asked for.
+        let one_at_a_time = evaluation.socket && self.threads.is_none();
+        let problem = if one_at_a_time {
             &evaluation.problem.searched_by(pool.current_num_threads())
         } else {
             &*evaluation.problem
@@ -54,9 +56,8 @@ impl Player<'_> {
             report(&bar, &record);
             Ok(())
         };
-        // One robot behind a socket plays one trial at a time.
         let results: Vec<Result<(), Error>> = pool.install(|| {
-            if evaluation.socket {
+            if one_at_a_time {
                 missing.iter().map(one).collect()
             } else {
                 missing.par_iter().with_max_len(1).map(one).collect()

@@ -8,7 +8,7 @@ use clap::Args;
 #[derive(Clone, Copy, Debug, Default, Args)]
 #[command(about = None, long_about = None)]
 pub struct Threads {
-    /// Worker threads [default: all cores]; what comes out does not depend on it.
+    /// Worker threads [default: all cores, but one in a task of slurm or hq]; but for times, what comes out does not depend on it.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub threads: Option<u32>,
 }

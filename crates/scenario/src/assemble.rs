@@ -36,7 +36,7 @@ pub struct Problem {
 const DISPLACED: usize = 100;
 
 impl Problem {
-    /// The same with another number of threads that search, at most as many as are allowed. No result depends on it.
+    /// The same with another number of threads that search, at most as many as are allowed. No result depends on it, unless the budget of a search is a time.
     #[must_use]
     pub fn searched_by(&self, threads: usize) -> Self {
         let mut problem = self.clone();

@@ -99,7 +99,7 @@ def try_log(rng, engine, variant, simulate=simulate, draws=wide):
         plan = draw_plan(rng, scene, rig)
         if "hidden_obstacle" in effects:
             plan = [episode for episode in plan if begins_free(scene, episode, effects["hidden_obstacle"])]
-            if len(plan) < rig.episodes / 2:
+            if len(plan) < max(6, rig.episodes / 2):
                 continue
         thin(rig, plan)
         for episode in plan:
@@ -129,7 +129,7 @@ def try_log(rng, engine, variant, simulate=simulate, draws=wide):
 def begins_free(scene, episode, obstacle):
     """Whether object and tool begin an episode beside the body in the way: engines throw apart what begins in one another."""
     x, y, radius = obstacle["x_m"], obstacle["y_m"], obstacle["size_0_m"]
-    object_m = math.hypot(*scene.half_sizes_m[:2]) if scene.shape == "box" else max(scene.half_sizes_m)
+    object_m = math.hypot(*scene.footprint)
     tool = [] if episode.course is None else [(episode.places(np.zeros(1))[0], scene.tool_radius_m)]
     return all(math.hypot(at[0] - x, at[1] - y) > radius + own for at, own in [(episode.pose, object_m), *tool])
 

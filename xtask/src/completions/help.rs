@@ -33,9 +33,9 @@ impl Help {
         own.map(|option| {
             let values = match &option.values[..] {
                 [] => String::new(),
-                values => format!(". Values: {}", values.join(", ")),
+                values => format!(". Values: {}.", values.join(", ")),
             };
-            (option.usage.clone(), format!("{}{values}", option.about))
+            (option.usage.clone(), format!("{}{values}", option.about.trim_end_matches('.')))
         })
     }
 
@@ -112,9 +112,13 @@ pub(crate) fn parse(text: &str) -> Help {
             option.about = [about.trim(), rest.trim()].join(" ").trim().to_string();
         } else if let Some((about, values)) = option.about.clone().split_once("Possible values:") {
             // One a line, with what it means: `- local: on this machine`.
+            let (values, default) = match values.split_once("[default: ") {
+                Some((values, default)) => (values, format!(" [default: {default}")),
+                None => (values, String::new()),
+            };
             let names = values.split("- ").filter_map(|value| value.split(':').next());
             option.values = names.map(|name| name.trim().to_owned()).filter(|name| !name.is_empty()).collect();
-            option.about = about.trim().to_string();
+            option.about = about.trim().to_string() + &default;
         }
     }
     help

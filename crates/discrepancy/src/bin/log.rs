@@ -102,6 +102,9 @@ fn run(options: &Checked) -> Result<bool, Error> {
         program::show(&(json + "\n"));
     } else {
         print(&log, &check, &sentences);
+        if !sentences.is_empty() && options.fix.is_none() {
+            program::out!("{MENDED}");
+        }
     }
     if let Some(out) = &options.fix {
         fix(&log, &check, &options.log, out)?;
@@ -197,6 +200,10 @@ fn print_mapping(correction: &Correction) {
     }
 }
 
+/// What to do about what looks wrong.
+const MENDED: &str =
+    "`cargo xtask log check LOG --fix NEW` writes a copy in which what can be mended is (docs/src/guides/check.md).";
+
 fn print(log: &Log, check: &Check, sentences: &[String]) {
     let rows: usize = log.episodes.iter().map(measured_log::Episode::rows).sum();
     program::out!("{} episodes, {rows} rows.", log.episodes.len());
@@ -250,10 +257,6 @@ fn print(log: &Log, check: &Check, sentences: &[String]) {
     }
     if sentences.is_empty() {
         program::out!("Nothing looks wrong.");
-    } else {
-        program::out!(
-            "`cargo xtask log check LOG --fix NEW` writes a copy in which what can be mended is (docs/src/guides/check.md)."
-        );
     }
     for what in &check.not_told {
         program::out!("This log does not tell {what}.");

@@ -170,7 +170,7 @@ fn memoryless_peer(
 /// Plays with the network.
 fn suggest_next(robot: &str, folder: &Path) {
     let folder = typed(folder);
-    let options = ["--domain", "D4", "--robot", robot, "--prior", &folder, "--trials", "10"];
+    let options = ["--domain", "D4", "--preset", "paper", "--robot", robot, "--prior", &folder, "--trials", "10"];
     let words = ["cargo", "xtask", "eval"].iter().chain(&options).map(ToString::to_string).collect();
     program::next(&[(words, "plays with it")]);
 }

@@ -144,7 +144,7 @@ fn taken(error: &whole_file::Error) -> anyhow::Error {
 fn start_threads(asked: program::Threads) -> Result<usize> {
     // What the search does with more threads than it has trees is nothing.
     rayon::ThreadPoolBuilder::new().num_threads(asked.count()).build_global()?;
-    Ok(rayon::current_num_threads())
+    Ok(rayon::current_num_threads().min(1024))
 }
 
 /// The same task again, in numbers or step by step.
