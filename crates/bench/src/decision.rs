@@ -111,11 +111,10 @@ impl Watcher for Onlooker<'_> {
 /// A scenario or network that does not load, and a world that contradicts it.
 pub fn run(root: &Path, task: &Task, note: impl Fn(&str) + Sync) -> Result<Value> {
     let from = &task.from;
-    let mut scenario = from.selection(root, "surmise").load()?;
+    let scenario = from.selection(root, "surmise").load()?;
     let pool =
         rayon::ThreadPoolBuilder::new().num_threads(task.threads).build().context("cannot start so many threads")?;
-    scenario.planner.threads = pool.current_num_threads().min(1024);
-    let problem = Problem::assemble(&scenario, root)?;
+    let problem = Problem::assemble(&scenario, root)?.searched_by(pool.current_num_threads());
     let network = Network::load(&Network::default_folder(root, &problem, false), &problem)?;
     let mut parts = pool.install(|| {
         (0..task.worlds).try_fold(Parts::default(), |parts, number| {

@@ -174,7 +174,11 @@ impl Candidate {
 /// All candidates that could show in such a log.
 #[must_use]
 pub fn candidates(context: &Context) -> Vec<Candidate> {
-    EffectKind::ALL.iter().filter(|kind| applies(**kind, context)).flat_map(|kind| of_kind(*kind, context)).collect()
+    EffectKind::ALL
+        .iter()
+        .filter(|kind| is_named(**kind) && applies(**kind, context))
+        .flat_map(|kind| of_kind(*kind, context))
+        .collect()
 }
 
 /// Whether a diagnosis names it. How stiff contacts are is re-tuned like a mass: engines differ by factors, and no log says what its contacts should be.
@@ -200,7 +204,6 @@ fn applies(kind: EffectKind, context: &Context) -> bool {
         K::ArmCompliance | K::ActuatorGain | K::ActuationDelay | K::Adhesion => context.tool,
         // What is thrown leaves its path wherever it meets the table: that says nothing of bodies.
         K::HiddenObstacle => context.tool,
-        K::ContactCompliance => is_named(kind),
         K::RollingResistance => sphere,
         K::PressureDistribution => !sphere,
         // What is pushed stays on its sole, whose size `pressure_distribution` has; of an outline the edges are its own.

@@ -80,10 +80,9 @@ fn run(arguments: &Arguments) -> Result<()> {
         set: arguments.overrides.set.clone(),
         effects: None,
     };
-    let mut scenario = selection.load()?;
-    scenario.planner.threads = start_threads(arguments.work).context(FAILED)?;
-    let scenario = scenario;
-    let problem = Problem::assemble(&scenario, &root)?;
+    let scenario = selection.load()?;
+    let threads = start_threads(arguments.work).context(FAILED)?;
+    let problem = Problem::assemble(&scenario, &root)?.searched_by(threads);
     let method = arguments.method.unwrap_or(match scenario.belief.filter {
         scenario::Filter::Bridge => Method::Mixture,
         scenario::Filter::Rejection => Method::RnnSampling,
@@ -144,7 +143,7 @@ fn taken(error: &whole_file::Error) -> anyhow::Error {
 fn start_threads(asked: program::Threads) -> Result<usize> {
     // What the search does with more threads than it has trees is nothing.
     rayon::ThreadPoolBuilder::new().num_threads(asked.count()).build_global()?;
-    Ok(rayon::current_num_threads().min(1024))
+    Ok(rayon::current_num_threads())
 }
 
 /// The same task again, in numbers or step by step.
