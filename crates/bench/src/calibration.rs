@@ -9,8 +9,9 @@ mod summary;
 mod table;
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use agent::Network;
+use agent::{ExternalWorld, Network, Timeouts, WorldAddress};
 use anyhow::{Context as _, Result, bail, ensure};
 use rayon::prelude::*;
 use scenario::{Problem, Selection};
@@ -24,6 +25,8 @@ pub use table::table;
 
 /// The preset whose belief is looked at.
 const PRESET: &str = "surmise";
+/// How long an external world may take for an answer.
+const WORLD_LIMIT: Duration = Duration::from_secs(60);
 /// Most bytes of a world's file.
 const MOST_BYTES: u64 = 1 << 24;
 
@@ -38,6 +41,22 @@ pub struct Task {
     pub quick: bool,
     /// Folder of the network; the default one where `None`.
     pub prior: Option<PathBuf>,
+    /// World to play in; the simulated one where `None`. It has to say what it has drawn.
+    pub world: Option<WorldAddress>,
+}
+
+/// Where an external world is, and how long it may take to answer.
+#[derive(Debug)]
+struct Place {
+    address: WorldAddress,
+    timeouts: Timeouts,
+}
+
+impl Place {
+    fn new(address: WorldAddress) -> Self {
+        let timeouts = Timeouts { start: WORLD_LIMIT, reset: WORLD_LIMIT, act: WORLD_LIMIT };
+        Self { address, timeouts }
+    }
 }
 
 /// What is written beside the worlds.
@@ -49,15 +68,19 @@ const RESULTS: [&str; 4] = ["calibration.json", "calibration.md", "calibration.s
 ///
 /// A scenario or network that does not load, a world that contradicts it, and a folder of another task.
 pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> Result<Value> {
-    let Task { from, worlds, quick, prior } = task;
+    let Task { from, worlds, quick, prior, world } = task;
     let selection = Selection { quick: *quick, ..from.selection(root, PRESET) };
     let scenario = selection.load()?;
     let problem = Problem::assemble(&scenario, root)?;
     let folder = prior.clone().unwrap_or_else(|| Network::default_folder(root, &problem, *quick));
     let network = Network::load(&folder, &problem)?;
-    let identity = json!({
+    let mut identity = json!({
         "scenario": scenario, "seed": from.seed, "network": network.hash(),
     });
+    let place = world.clone().map(Place::new);
+    if let Some(Place { address, timeouts }) = &place {
+        identity["world"] = json!(ExternalWorld::start(address, *timeouts, &problem)?.identity());
+    }
     let own = out.join("task.json");
     if own.exists() {
         let found: Value = serde_json::from_slice(&whole_file::read(&own, MOST_BYTES)?)
@@ -71,23 +94,23 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
             .with_context(|| format!("cannot make the folder {}", out.display()))?;
         whole_file::write(&own, pretty(&identity).as_bytes(), Existing::Keep)?;
     }
-    let world = |number: u32| -> Result<World> {
+    let one = |number: u32| -> Result<World> {
         let path = out.join(format!("worlds/{number:04}.json"));
         if path.exists() {
             return serde_json::from_slice(&whole_file::read(&path, MOST_BYTES)?)
                 .with_context(|| format!("{} is no world of this benchmark: move it away", path.display()));
         }
-        let world = episode::play(&problem, &network, pomdp::Seed(from.seed), number)?;
+        let world = episode::play(&problem, &network, pomdp::Seed(from.seed), number, place.as_ref())?;
         whole_file::write(&path, serde_json::to_string(&world)?.as_bytes(), Existing::Replace)?;
         note(&format!("world {number}: {} after {} actions", world.reason, world.filter.len().saturating_sub(1)));
         Ok(world)
     };
-    let worlds: Vec<World> = (0..*worlds).into_par_iter().map(world).collect::<Result<_>>()?;
+    let worlds: Vec<World> = (0..*worlds).into_par_iter().map(one).collect::<Result<_>>()?;
     let summary = summary::summary(
         &worlds,
         &json!({
             "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": from.seed,
-            "set": from.overrides.set, "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
+            "set": from.overrides.set, "world": identity.get("world"), "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
         }),
     );
     whole_file::write(&out.join("calibration.json"), pretty(&summary).as_bytes(), Existing::Replace)?;

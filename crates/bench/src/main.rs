@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use agent::WorldAddress;
 use anyhow::{Context as _, Result};
 use bench::physics::{self, Effort, OBSTACLES};
 use bench::worlds::Worlds;
@@ -53,6 +54,10 @@ enum What {
         /// Folder of the network [default: the one trained here, else the shipped one].
         #[arg(long)]
         prior: Option<PathBuf>,
+        /// World to play in instead of the simulated one, as for `eval`. It has to say what it has drawn: `scene` in
+        /// docs/src/reference/world-protocol.md.
+        #[arg(long, value_name = "COMMAND|ADDRESS")]
+        world: Option<WorldAddress>,
         /// Folder of the results. Worlds that it has are not played again.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -198,8 +203,9 @@ fn run(arguments: &Arguments) -> Result<()> {
                 program::show(&table(&result));
             }
         }
-        What::Calibration { from, worlds, quick, prior, out } => {
-            let task = calibration::Task { from: from.clone(), worlds: *worlds, quick: *quick, prior: prior.clone() };
+        What::Calibration { from, worlds, quick, prior, world, out } => {
+            let (prior, world) = (prior.clone(), world.clone());
+            let task = calibration::Task { from: from.clone(), worlds: *worlds, quick: *quick, prior, world };
             let summary = calibration::run(&root, &task, out, |text| program::say!("{text}"))?;
             program::show(&calibration::table(&summary));
         }

@@ -1,11 +1,14 @@
 //! Which values of a world are believed: those that this arm's sensors could have measured.
 
-use push_task::Observation;
+use physics_model::BodyState;
+use physics_model::feasible::check_theta;
+use physics_model::theta::standard_com_m;
 use push_task::sensor::observation_names;
+use push_task::{Observation, Particle, State};
 use scenario::Problem;
 
 use super::WorldError;
-use super::message::wrong;
+use super::message::{Place, SceneAnswer, wrong};
 
 /// Beyond this an object is not on the table: the range of the published observation, ±m.
 const POSITION_RANGE_M: f64 = 10.0;
@@ -104,4 +107,34 @@ pub(super) fn start(request: &'static str, problem: &Problem, joints_rad: &[f64]
     }
     let expectation = format!("expected the tool within {limit_m} m of {:?}, found it at {tool:?}", task.tool_start_m);
     Err(wrong(request, "joints_rad", &expectation))
+}
+
+/// What the world says it has drawn, as a particle: for statistics of a belief.
+pub(super) fn scene(
+    request: &'static str,
+    joints_rad: &[f64],
+    has_obstacle: Option<bool>,
+    answer: SceneAnswer,
+) -> Result<Particle, WorldError> {
+    let SceneAnswer { mut theta, object, obstacle } = answer;
+    theta.object.com_m = standard_com_m(theta.object.shape, theta.object.com_m);
+    check_theta(&theta).map_err(|error| wrong(request, "scene.theta", &error.to_string()))?;
+    let with = theta.obstacle.is_some();
+    if obstacle.is_some() != with {
+        return Err(wrong(request, "scene.obstacle", "expected a place where theta has an obstacle, and only there"));
+    }
+    if has_obstacle.is_some_and(|said| said != with) {
+        return Err(wrong(request, "has_obstacle", "expected what scene says"));
+    }
+    let body = |field: &str, place: Place| {
+        let inside = place.position_m.iter().all(|v| (-POSITION_RANGE_M..=POSITION_RANGE_M).contains(v));
+        if inside && place.yaw_rad.is_finite() {
+            return Ok(BodyState::at_rest(place.position_m, place.yaw_rad));
+        }
+        let expectation = format!("expected a position within {POSITION_RANGE_M} m and a finite yaw, found {place:?}");
+        Err(wrong(request, field, &expectation))
+    };
+    let object = body("scene.object", object)?;
+    let obstacle = obstacle.map(|place| body("scene.obstacle", place)).transpose()?;
+    Ok(Particle::new(State { joints_rad: joints_rad.to_vec(), object, obstacle }, theta))
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use physics_model::Theta;
 use physics_model::config::ObstacleMobility;
 use physics_model::robot::ToolShape;
 use push_task::config::{ForceSensing, GoalConfig, NoiseConfig, ReachConfig};
@@ -160,6 +161,24 @@ pub(super) struct ResetAnswer {
     pub(super) joints_rad: Option<Vec<f64>>,
     pub(super) tool_m: Option<[f64; 3]>,
     pub(super) has_obstacle: Option<bool>,
+    pub(super) scene: Option<SceneAnswer>,
+}
+
+/// What a simulated world has drawn.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SceneAnswer {
+    pub(super) theta: Theta,
+    pub(super) object: Place,
+    pub(super) obstacle: Option<Place>,
+}
+
+/// Where a body stands.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Place {
+    pub(super) position_m: [f64; 3],
+    pub(super) yaw_rad: f64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -249,12 +268,13 @@ mod tests {
     use super::*;
     use crate::external::{check, identity};
 
-    /// The JSON blocks of the documentation: hello, its answer, reset, its answer, act, its answer, error, close.
+    /// The JSON blocks of the documentation: hello, its answer, reset, its answer, a scene, act, its answer,
+    /// error, close.
     fn documented(root: &Path) -> Vec<String> {
         let text = std::fs::read_to_string(root.join("docs/src/reference/world-protocol.md")).unwrap();
         let blocks: Vec<String> =
             text.split("```json\n").skip(1).map(|b| b.split("```").next().unwrap().into()).collect();
-        assert_eq!(blocks.len(), 8);
+        assert_eq!(blocks.len(), 9);
         blocks
     }
 
@@ -280,7 +300,7 @@ mod tests {
         let sent = [
             (0, Request::Hello(Box::new(Hello::new(&problem)))),
             (2, Request::Reset { trial: 3, seed: 11_617_853_411_447_968_551 }),
-            (4, Request::Act { step: 1, action, move_m: move_m(action, 0.02) }),
+            (5, Request::Act { step: 1, action, move_m: move_m(action, 0.02) }),
         ];
         for (block, request) in sent {
             let documented: Value = serde_json::from_str(&blocks[block]).unwrap();
@@ -301,11 +321,17 @@ mod tests {
         let near = &problem.start_joints_rad;
         let joints = check::joints("reset", &problem, near, reset.joints_rad, reset.tool_m).unwrap();
         check::start("reset", &problem, &joints).unwrap();
-        let Answer::Act(act) = Answer::parse("act", &line(5)).unwrap() else { panic!("an act") };
+        // The scene stands by itself there, and is a key of the answer.
+        let mut answer: Value = serde_json::from_str(&line(3)).unwrap();
+        answer["reset"]["scene"] = serde_json::from_str::<Value>(&line(4)).unwrap()["scene"].take();
+        let Answer::Reset(reset) = Answer::parse("reset", &answer.to_string()).unwrap() else { panic!("a reset") };
+        let scene = check::scene("reset", &joints, reset.has_obstacle, reset.scene.unwrap()).unwrap();
+        assert_eq!(scene.state.obstacle.unwrap().position_m, [0.53, 0.05, 0.045]);
+        let Answer::Act(act) = Answer::parse("act", &line(6)).unwrap() else { panic!("an act") };
         check::observation("act", &problem, act.observation).unwrap();
         check::joints("act", &problem, near, act.joints_rad, act.tool_m).unwrap();
-        let error = Answer::parse("act", &line(6)).unwrap_err().to_string();
+        let error = Answer::parse("act", &line(7)).unwrap_err().to_string();
         assert!(error.contains("the gripper does not answer"), "{error}");
-        assert_eq!(blocks[7].trim(), super::super::link::CLOSE);
+        assert_eq!(blocks[8].trim(), super::super::link::CLOSE);
     }
 }

@@ -90,6 +90,7 @@ impl ExternalWorld {
             joints_rad: problem.start_joints_rad.clone(),
             object_moved: false,
             has_obstacle: None,
+            scene: None,
         }
     }
 }
@@ -139,6 +140,7 @@ pub struct ExternalEpisode<'a> {
     joints_rad: Vec<f64>,
     object_moved: bool,
     has_obstacle: Option<bool>,
+    scene: Option<Particle>,
 }
 
 impl ExternalEpisode<'_> {
@@ -146,6 +148,12 @@ impl ExternalEpisode<'_> {
     #[must_use]
     pub fn has_obstacle(&self) -> Option<bool> {
         self.has_obstacle
+    }
+
+    /// Parameters and first places of what the world has drawn, where it says so: for statistics, never for a method.
+    #[must_use]
+    pub fn scene(&self) -> Option<&Particle> {
+        self.scene.as_ref()
     }
 
     fn try_reset(&mut self) -> Result<(Observation, Vec<f64>), WorldError> {
@@ -159,7 +167,10 @@ impl ExternalEpisode<'_> {
         let near = &self.problem.start_joints_rad;
         self.joints_rad = check::joints("reset", self.problem, near, answer.joints_rad, answer.tool_m)?;
         check::start("reset", self.problem, &self.joints_rad)?;
-        (self.steps, self.object_moved, self.has_obstacle) = (0, false, answer.has_obstacle);
+        let scene = |scene| check::scene("reset", &self.joints_rad, answer.has_obstacle, scene);
+        self.scene = answer.scene.map(scene).transpose()?;
+        let said = self.scene.as_ref().map(|scene| scene.theta.obstacle.is_some());
+        (self.steps, self.object_moved, self.has_obstacle) = (0, false, answer.has_obstacle.or(said));
         Ok((observation, self.joints_rad.clone()))
     }
 

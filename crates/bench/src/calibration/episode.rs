@@ -1,13 +1,18 @@
 //! One world: an episode, and what each source says of it at each step.
 
-use agent::{Agent, Estimate, Method, Network, SimulatedWorld, StepView, Watcher};
-use anyhow::{Result, bail};
+use agent::{
+    Agent, Estimate, ExternalEpisode, ExternalWorld, Method, Network, SimulatedWorld, StepView, Watcher,
+    World as Acted, WorldStep,
+};
+use anyhow::{Context as _, Result, bail};
 use belief::Particles;
 use pomdp::{Belief as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
 use push_task::{Action, Observation, Particle};
 use rand::RngExt as _;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
+
+use super::Place;
 
 /// Draws from prior and network at each step.
 const DRAWS: usize = 100;
@@ -98,14 +103,56 @@ impl Watcher for Onlooker {
     }
 }
 
+/// A world of which the first answer is kept. One that says what it has drawn knows the truth, as far as that does not change.
+struct Opened<W> {
+    world: W,
+    first: Option<(Observation, Vec<f64>)>,
+    truth: fn(&W) -> Option<&Particle>,
+}
+
+impl<W> Opened<W> {
+    fn new(world: W, truth: fn(&W) -> Option<&Particle>) -> Self {
+        Self { world, first: None, truth }
+    }
+}
+
+impl<W: Acted> Acted for Opened<W> {
+    fn reset(&mut self) -> Result<(Observation, Vec<f64>), agent::Error> {
+        let first = self.world.reset()?;
+        self.first = Some(first.clone());
+        Ok(first)
+    }
+
+    fn act(&mut self, action: Action) -> Result<WorldStep, agent::Error> {
+        self.world.act(action)
+    }
+
+    fn truth(&self) -> Option<&Particle> {
+        (self.truth)(&self.world)
+    }
+}
+
 /// Plays world `number`.
-pub(super) fn play(problem: &Problem, network: &Network, root: Seed, number: u32) -> Result<World> {
+pub(super) fn play(
+    problem: &Problem,
+    network: &Network,
+    root: Seed,
+    number: u32,
+    place: Option<&Place>,
+) -> Result<World> {
     let seed = root.child(Purpose::World, u64::from(number));
-    let start = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
-    let has_obstacle = start.theta.obstacle.is_some();
-    let mut first = start.clone();
-    let observation = problem.truth.initial_observation(&mut first, &mut seed.stream(Purpose::Truth, 0));
-    let mut world = SimulatedWorld::new(&problem.truth, start.clone(), seed.stream(Purpose::Truth, 0));
+    let Some(Place { address, timeouts }) = place else {
+        let start = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
+        let world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
+        return played(problem, network, seed, Opened::new(world, Acted::truth));
+    };
+    let mut world = ExternalWorld::start(address, *timeouts, problem)?;
+    // The seed of a trial of `eval --world`: the same scene.
+    let episode = world.episode(problem, number, seed.0);
+    played(problem, network, seed, Opened::new(episode, ExternalEpisode::scene))
+}
+
+fn played<W: Acted>(problem: &Problem, network: &Network, seed: Seed, mut world: Opened<W>) -> Result<World> {
     let mut onlooker = Onlooker {
         truth: None,
         rows: Vec::new(),
@@ -118,12 +165,21 @@ pub(super) fn play(problem: &Problem, network: &Network, root: Seed, number: u32
     let started = std::time::Instant::now();
     let episode = Agent::new(problem, Method::Mixture, Some(network))?.run_watched(&mut world, seed, &mut onlooker)?;
     let seconds = started.elapsed().as_secs_f64() / episode.steps.len().max(1) as f64;
+    if let Some(failure) = episode.failure {
+        bail!(failure);
+    }
+    let (observation, joints_rad) = world.first.context("an episode begins with a reset")?;
+    let Some(start) = onlooker.truth else {
+        bail!(
+            "the world does not say what it has drawn: expected `scene` in its answer to `reset` (docs/src/reference/world-protocol.md)"
+        );
+    };
 
     let mut rng = seed.stream(Purpose::Statistics, 1);
     let Network::Posterior(network) = network else { bail!("expected the network of a bridge filter") };
     let mut network = network.clone();
     network.reset();
-    network.observe(&problem.model, None, &observation, &start.state.joints_rad);
+    network.observe(&problem.model, None, &observation, &joints_rad);
     let history = agent::history(problem, Some(&network), &observation);
     let prior = Estimate::prior(&history);
     let mut draws = |estimate: &Estimate<'_>| -> Result<Row> {
@@ -145,7 +201,7 @@ pub(super) fn play(problem: &Problem, network: &Network, root: Seed, number: u32
     Ok(World {
         reason: episode.reason.name().into(),
         discounted_return: episode.discounted_return,
-        has_obstacle,
+        has_obstacle: start.theta.obstacle.is_some(),
         first_contact: episode.steps.iter().position(touched).map(|index| index + 1),
         filter: onlooker.rows,
         prior: of_prior,

@@ -22,11 +22,12 @@ const COLUMNS: [(&str, &str, usize); 8] = [
 pub fn table(summary: &Value) -> String {
     let p = &summary["provenance"];
     let mut text = format!(
-        "# Calibration of the belief: {} on the {}\n\n{} worlds of seed {}, preset {}. In brackets: 95 % by bootstrap over worlds.\n\n",
+        "# Calibration of the belief: {} on the {}\n\n{} worlds of seed {}{}, preset {}. In brackets: 95 % by bootstrap over worlds.\n\n",
         p["domain"].as_str().unwrap_or_default(),
         p["robot"].as_str().unwrap_or_default(),
         p["worlds"],
         p["seed"],
+        p["world"]["name"].as_str().map(|name| format!(", played in {name}")).unwrap_or_default(),
         p["preset"].as_str().unwrap_or_default()
     );
     text += "| step | belief |";
