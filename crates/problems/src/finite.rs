@@ -292,7 +292,8 @@ pub(crate) mod tests {
         let known = FullInformation::solve(&Rooms, 1e-12);
         let belief = [(false, 3.0), (true, 1.0)];
         let mean = |action: bool| {
-            0.75 * known.action_value(&Rooms, &false, &action) + 0.25 * known.action_value(&Rooms, &true, &action)
+            let value = |state: bool| known.action_values(&Rooms, &state)[usize::from(action)];
+            0.75 * value(false) + 0.25 * value(true)
         };
         let value = known.belief_value(&Rooms, &belief, 9);
         assert!((value - mean(false).max(mean(true))).abs() < 1e-12);

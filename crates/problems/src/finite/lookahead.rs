@@ -38,7 +38,8 @@ impl<'a> Lookahead<'a> {
     where
         M::State: Clone,
     {
-        best(model, |action| self.action_value(model, belief, action, rng))
+        let values = model.actions().iter().map(|action| self.action_value(model, belief, action, rng));
+        best(model, &values.collect::<Vec<f64>>())
     }
 
     fn action_value<M: Finite>(

@@ -10,29 +10,37 @@ use super::{ExactBelief, Finite};
 #[derive(Clone, Debug)]
 pub struct FullInformation {
     values: Vec<f64>,
+    /// Of each state those of all actions, in the order of the model: a belief asks for thousands.
+    of_actions: Vec<f64>,
 }
 
 impl FullInformation {
     /// Value iteration in place, in turn upwards and downwards through the states, until no value changes by more than `tolerance`.
     #[must_use]
     pub fn solve<M: Finite>(model: &M, tolerance: f64) -> Self {
-        let mut solution = Self { values: vec![0.0; model.states()] };
+        let mut values = vec![0.0; model.states()];
         loop {
             let mut change = 0.0_f64;
             for upwards in [true, false] {
-                for count in 0..solution.values.len() {
-                    let index = if upwards { count } else { solution.values.len() - 1 - count };
+                for count in 0..values.len() {
+                    let index = if upwards { count } else { values.len() - 1 - count };
                     let state = model.state(index);
-                    let values = model.actions().iter().map(|action| solution.action_value(model, &state, action));
-                    let best = values.fold(f64::NEG_INFINITY, f64::max);
-                    change = change.max((best - solution.values[index]).abs());
-                    solution.values[index] = best;
+                    let of_actions = model.actions().iter().map(|action| backup(model, &values, &state, action));
+                    let best = of_actions.fold(f64::NEG_INFINITY, f64::max);
+                    change = change.max((best - values[index]).abs());
+                    values[index] = best;
                 }
             }
             if change <= tolerance {
-                return solution;
+                break;
             }
         }
+        let of_actions = (0..values.len()).flat_map(|index| {
+            let (state, values) = (model.state(index), &values);
+            model.actions().iter().map(move |action| backup(model, values, &state, action))
+        });
+        let of_actions = of_actions.collect();
+        Self { values, of_actions }
     }
 
     /// Value of a state in which the episode goes on.
@@ -41,15 +49,11 @@ impl FullInformation {
         self.values[model.index(state)]
     }
 
-    /// Value of an action in a state.
+    /// Values of all actions in a state, in the order of the model.
     #[must_use]
-    pub fn action_value<M: Finite>(&self, model: &M, state: &M::State, action: &M::Action) -> f64 {
-        let mut value = 0.0;
-        model.successors(state, action, |next| {
-            let later = if next.outcome == Outcome::Continue { self.values[model.index(&next.state)] } else { 0.0 };
-            value += next.probability * (next.reward + model.discount() * later);
-        });
-        value
+    pub fn action_values<M: Finite>(&self, model: &M, state: &M::State) -> &[f64] {
+        let count = model.actions().len();
+        &self.of_actions[count * model.index(state)..][..count]
     }
 
     /// QMDP: the action with the highest mean value, the first of several.
@@ -58,21 +62,35 @@ impl FullInformation {
     where
         M::State: Clone,
     {
-        best(model, |action| self.mean_action_value(model, belief.probabilities(), action))
+        best(model, &self.mean_action_values(model, belief.probabilities()))
     }
 
-    /// Mean of [`Self::action_value`] over weighted states, times the sum of the weights.
-    fn mean_action_value<'a, M: Finite>(
+    /// Means of [`Self::action_values`] over weighted states, times the sum of the weights.
+    pub(crate) fn mean_action_values<'a, M: Finite>(
         &self,
         model: &M,
         belief: impl Iterator<Item = (&'a M::State, f64)>,
-        action: &M::Action,
-    ) -> f64
+    ) -> Vec<f64>
     where
         M::State: 'a,
     {
-        belief.map(|(state, weight)| weight * self.action_value(model, state, action)).sum()
+        let mut means = vec![0.0; model.actions().len()];
+        for (state, weight) in belief {
+            let values = self.action_values(model, state);
+            means.iter_mut().zip(values).for_each(|(mean, value)| *mean += weight * value);
+        }
+        means
     }
+}
+
+/// Value of an action in a state, from those of the states after it.
+fn backup<M: Finite>(model: &M, values: &[f64], state: &M::State, action: &M::Action) -> f64 {
+    let mut value = 0.0;
+    model.successors(state, action, |next| {
+        let later = if next.outcome == Outcome::Continue { values[model.index(&next.state)] } else { 0.0 };
+        value += next.probability * (next.reward + model.discount() * later);
+    });
+    value
 }
 
 /// The states of a belief with their weights.
@@ -80,16 +98,16 @@ fn weighted<S>(belief: &[(S, f64)]) -> impl Iterator<Item = (&S, f64)> {
     belief.iter().map(|(state, weight)| (state, *weight))
 }
 
-/// The action with the highest value, the first of several.
-pub(super) fn best<M: GenerativeModel>(model: &M, mut value: impl FnMut(&M::Action) -> f64) -> M::Action {
-    let valued = model.actions().iter().map(|action| (action, value(action)));
-    let best = valued.reduce(|best, next| if next.1.total_cmp(&best.1).is_gt() { next } else { best });
+/// The action with the highest of `values`, which are in the order of the model; the first of several.
+pub(super) fn best<M: GenerativeModel>(model: &M, values: &[f64]) -> M::Action {
+    let valued = model.actions().iter().zip(values);
+    let best = valued.reduce(|best, next| if next.1.total_cmp(best.1).is_gt() { next } else { best });
     best.expect("a model has actions").0.clone()
 }
 
 impl<M: Finite> Policy<M> for FullInformation {
     fn action(&self, model: &M, state: &M::State, _rng: &mut Rng) -> M::Action {
-        best(model, |action| self.action_value(model, state, action))
+        best(model, self.action_values(model, state))
     }
 
     fn leaf_value(&self, model: &M, state: &M::State, _actions_left: usize) -> f64 {
@@ -98,14 +116,13 @@ impl<M: Finite> Policy<M> for FullInformation {
 
     /// QMDP.
     fn belief_action(&self, model: &M, belief: &[(M::State, f64)], _rng: &mut Rng) -> M::Action {
-        best(model, |action| self.mean_action_value(model, weighted(belief), action))
+        best(model, &self.mean_action_values(model, weighted(belief)))
     }
 
     /// The value of QMDP: that of one more action for a belief, after which the state is known.
     fn belief_value(&self, model: &M, belief: &[(M::State, f64)], _actions_left: usize) -> f64 {
         let total: f64 = belief.iter().map(|(_, weight)| weight).sum();
-        let value = |action| self.mean_action_value(model, weighted(belief), action);
-        model.actions().iter().map(value).fold(f64::NEG_INFINITY, f64::max) / total
+        self.mean_action_values(model, weighted(belief)).into_iter().fold(f64::NEG_INFINITY, f64::max) / total
     }
 }
 
