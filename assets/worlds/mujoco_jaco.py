@@ -69,15 +69,15 @@ def draw_body(rng, d, table):
     return body
 
 
-def theta(body, more):
-    """Parameters of a body as the protocol names them; `more` are those that only the object has."""
-    units = {"com": "com_m", "friction": "friction"}
-    return body and {"shape": body["shape"], "mass_kg": body["mass"], "size_m": (body["size"] + [0.0, 0.0])[:3],
-                     **{units[name]: body[name] for name in more}}
-
-
 def place(body):
     return body and {"position_m": body["pos"], "yaw_rad": body["yaw"]}
+
+
+def drawn(obj, obstacle):
+    """What the scene was drawn as, for statistics of a belief; places are those before bodies settle."""
+    plain = lambda body: body and {"shape": body["shape"], "mass_kg": body["mass"], "size_m": (body["size"] + [0.0, 0.0])[:3]}
+    theta = {"object": {**plain(obj), "com_m": obj["com"], "friction": obj["friction"]}, "obstacle": plain(obstacle)}
+    return {"theta": theta, "object": place(obj), "obstacle": place(obstacle)}
 
 
 def inertia(body):
@@ -197,8 +197,7 @@ class World:
                 break
         else:
             raise ValueError(f"{DRAWS} draws in a row overlapped")
-        self.scene = {"theta": {"object": theta(obj, ("com", "friction")), "obstacle": theta(self.obstacle, ())},
-                      "object": place(obj), "obstacle": place(self.obstacle)}
+        self.drawn = drawn(obj, self.obstacle)
         self.names = [self.m.geom(i).name for i in range(self.m.ngeom)]
         mass = np.zeros((self.m.nv, self.m.nv))
         mujoco.mj_fullM(self.m, self.d, mass)
@@ -209,7 +208,7 @@ class World:
         for _ in range(SETTLE_STEPS):
             mujoco.mj_step(self.m, self.d)
         return {"trial": trial, "observation": self.observe(self.torques()), "joints_rad": self.d.qpos[:n].tolist(),
-                "has_obstacle": self.obstacle is not None, "scene": self.scene}
+                "has_obstacle": self.obstacle is not None, "drawn": self.drawn}
 
     def act(self, step, move):
         """One tool move: straight, minimum jerk. Where a joint takes too much, the arm goes back along its way."""

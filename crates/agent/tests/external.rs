@@ -95,16 +95,16 @@ fn places_become_joints_and_quaternions_take_their_standard_form() {
 }
 
 #[test]
-fn what_a_world_says_of_its_scene_is_for_statistics() {
+fn what_a_world_says_it_has_drawn_is_for_statistics() {
     let problem = problem("jaco");
-    let mut world = ExternalWorld::start(&address("reset-scene"), generous(), &problem).unwrap();
+    let mut world = ExternalWorld::start(&address("reset-drawn"), generous(), &problem).unwrap();
     let mut episode = world.episode(&problem, 0, 1);
-    assert_eq!(episode.scene(), None);
+    assert_eq!(episode.drawn(), None);
     episode.reset().unwrap();
-    let scene = episode.scene().unwrap();
-    assert_eq!(scene.theta.object.mass_kg, 0.5);
-    assert_eq!(scene.state.obstacle.as_ref().unwrap().position_m, [0.53, 0.05, 0.045]);
-    assert_eq!(episode.has_obstacle(), Some(true), "as the scene says");
+    let drawn = episode.drawn().unwrap();
+    assert_eq!(drawn.theta.object.mass_kg, 0.5);
+    assert_eq!(drawn.state.obstacle.as_ref().unwrap().position_m, [0.53, 0.05, 0.045]);
+    assert_eq!(episode.has_obstacle(), Some(true), "as what was drawn has one");
     assert!(episode.truth().is_none(), "no method may know of it");
 }
 
@@ -120,7 +120,7 @@ fn a_world_without_truth_refuses_the_oracle() {
 #[test]
 fn every_wrong_answer_names_its_message_and_field() {
     let problem = problem("jaco");
-    let cases: [(&str, &[&str]); 38] = [
+    let cases: [(&str, &[&str]); 39] = [
         ("act-nonsense", &["`act`", "expected"]),
         ("act-empty", &["`act`", "the text ends before it is complete"]),
         ("act-array", &["`act`", "expected"]),
@@ -154,10 +154,11 @@ fn every_wrong_answer_names_its_message_and_field() {
         ("act-endless", &["`act`", "65536 bytes"]),
         ("reset-short", &["`reset`", "`observation`", "expected 13 values, found 12"]),
         ("reset-wrong-trial", &["`reset`", "`trial`", "expected 5, found 77"]),
-        ("reset-scene-grams", &["`reset`", "`scene.theta`", "mass", "500"]),
-        ("reset-scene-nowhere", &["`reset`", "`scene.obstacle`", "only there"]),
-        ("reset-scene-denied", &["`reset`", "`has_obstacle`", "what scene says"]),
-        ("reset-scene-far", &["`reset`", "`scene.object`", "within 10 m"]),
+        ("reset-drawn-grams", &["`reset`", "`drawn.theta`", "mass", "500"]),
+        ("reset-drawn-nowhere", &["`reset`", "`drawn.obstacle`", "only there"]),
+        ("reset-drawn-denied", &["`reset`", "`has_obstacle`", "expected true", "found false"]),
+        ("reset-drawn-low", &["`reset`", "`drawn.object`", "0.045 m high"]),
+        ("reset-drawn-far", &["`reset`", "`drawn.object`", "where it is observed"]),
         ("reset-elsewhere", &["`reset`", "within 0.02 m of [0.46, -0.26, 0.05]"]),
     ];
     for (mode, parts) in cases {

@@ -11,7 +11,7 @@ mod table;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use agent::{ExternalWorld, Network, Timeouts, WorldAddress};
+use agent::{ExternalWorld, Network, Timeouts, World as _, WorldAddress, WorldIdentity};
 use anyhow::{Context as _, Result, bail, ensure};
 use rayon::prelude::*;
 use scenario::{Problem, Selection};
@@ -27,6 +27,8 @@ pub use table::table;
 const PRESET: &str = "surmise";
 /// How long an external world may take for an answer.
 const WORLD_LIMIT: Duration = Duration::from_secs(60);
+/// Reason of an episode that an external world did not bring to an end.
+const FAILED: &str = "world-failed";
 /// Most bytes of a world's file.
 const MOST_BYTES: u64 = 1 << 24;
 
@@ -45,18 +47,40 @@ pub struct Task {
     pub world: Option<WorldAddress>,
 }
 
-/// Where an external world is, and how long it may take to answer.
+/// An external world.
 #[derive(Debug)]
-struct Place {
+struct External {
     address: WorldAddress,
-    timeouts: Timeouts,
+    identity: WorldIdentity,
 }
 
-impl Place {
-    fn new(address: WorldAddress) -> Self {
-        let timeouts = Timeouts { start: WORLD_LIMIT, reset: WORLD_LIMIT, act: WORLD_LIMIT };
-        Self { address, timeouts }
+impl External {
+    /// Starts it, and sets up world `number`, to see whether it says what it has drawn.
+    fn new(address: &WorldAddress, problem: &Problem, seed: u64, number: u32) -> Result<Self> {
+        let mut world = ExternalWorld::start(address, timeouts(), problem)?;
+        let identity = world.identity().clone();
+        let mut episode = world.episode(problem, number, episode::seed(seed, number).0);
+        episode.reset()?;
+        let expectation = "expected `drawn` in its answer to `reset` (docs/src/reference/world-protocol.md)";
+        ensure!(episode.drawn().is_some(), "the world {} does not say what it has drawn: {expectation}", identity.name);
+        Ok(Self { address: address.clone(), identity })
     }
+
+    fn start(&self, problem: &Problem) -> Result<ExternalWorld> {
+        let world = ExternalWorld::start(&self.address, timeouts(), problem)?;
+        let (was, is) = (&self.identity, world.identity());
+        ensure!(was == is, "the world was {} {} and is {} {} now", was.name, was.version, is.name, is.version);
+        Ok(world)
+    }
+
+    /// A socket is one world: as `eval` does, its episodes are played in turn.
+    fn is_one(&self) -> bool {
+        matches!(self.address, WorldAddress::Tcp(_))
+    }
+}
+
+fn timeouts() -> Timeouts {
+    Timeouts { start: WORLD_LIMIT, reset: WORLD_LIMIT, act: WORLD_LIMIT }
 }
 
 /// What is written beside the worlds.
@@ -77,15 +101,18 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     let mut identity = json!({
         "scenario": scenario, "seed": from.seed, "network": network.hash(),
     });
-    let place = world.clone().map(Place::new);
-    if let Some(Place { address, timeouts }) = &place {
-        identity["world"] = json!(ExternalWorld::start(address, *timeouts, &problem)?.identity());
+    let external = world.as_ref().map(|address| External::new(address, &problem, from.seed, 0)).transpose()?;
+    if let Some(external) = &external {
+        identity["world"] = json!(external.identity);
     }
     let own = out.join("task.json");
     if own.exists() {
         let found: Value = serde_json::from_slice(&whole_file::read(&own, MOST_BYTES)?)
             .with_context(|| format!("{} is no task of this benchmark: move it away", own.display()))?;
-        ensure!(found == identity, "{} holds the worlds of another task: choose another folder", out.display());
+        let other =
+            ["scenario", "seed", "network", "world"].into_iter().find(|key| found.get(key) != identity.get(key));
+        let other = other.map_or(String::new(), |key| format!(" (another {key})"));
+        ensure!(found == identity, "{} holds the worlds of another task{other}: choose another folder", out.display());
     } else {
         if let Some(file) = RESULTS.iter().find(|file| out.join(file).exists()) {
             bail!("{} holds {file}, which this benchmark did not write: choose another folder", out.display());
@@ -100,19 +127,29 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
             return serde_json::from_slice(&whole_file::read(&path, MOST_BYTES)?)
                 .with_context(|| format!("{} is no world of this benchmark: move it away", path.display()));
         }
-        let world = episode::play(&problem, &network, pomdp::Seed(from.seed), number, place.as_ref())?;
+        let world = episode::play(&problem, &network, from.seed, number, external.as_ref())
+            .with_context(|| format!("world {number}"))?;
         whole_file::write(&path, serde_json::to_string(&world)?.as_bytes(), Existing::Replace)?;
         note(&format!("world {number}: {} after {} actions", world.reason, world.filter.len().saturating_sub(1)));
         Ok(world)
     };
-    let worlds: Vec<World> = (0..*worlds).into_par_iter().map(one).collect::<Result<_>>()?;
-    let summary = summary::summary(
-        &worlds,
-        &json!({
+    let played: Vec<World> = if external.as_ref().is_some_and(External::is_one) {
+        (0..*worlds).map(one).collect::<Result<_>>()?
+    } else {
+        (0..*worlds).into_par_iter().map(one).collect::<Result<_>>()?
+    };
+    // What failed is counted, and says nothing of a belief.
+    let (failed, played): (Vec<World>, Vec<World>) = played.into_iter().partition(|world| world.reason == FAILED);
+    ensure!(!played.is_empty(), "every world failed: {}", failed[0].failure.as_deref().unwrap_or_default());
+    let mut provenance = json!({
             "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": from.seed,
-            "set": from.overrides.set, "world": identity.get("world"), "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
-        }),
-    );
+        "set": from.overrides.set, "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
+    });
+    if let Some(external) = &external {
+        provenance["world"] = json!(external.identity);
+        provenance["failed"] = json!(failed.len());
+    }
+    let summary = summary::summary(&played, &provenance);
     whole_file::write(&out.join("calibration.json"), pretty(&summary).as_bytes(), Existing::Replace)?;
     whole_file::write(&out.join("calibration.md"), table(&summary).as_bytes(), Existing::Replace)?;
     figures::save(&summary, out)?;

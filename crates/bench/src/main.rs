@@ -54,7 +54,7 @@ enum What {
         /// Folder of the network [default: the one trained here, else the shipped one].
         #[arg(long)]
         prior: Option<PathBuf>,
-        /// World to play in instead of the simulated one, as for `eval`. It has to say what it has drawn: `scene` in
+        /// World to play in instead of the simulated one, as for `eval`. It has to say what it has drawn: `drawn` in
         /// docs/src/reference/world-protocol.md.
         #[arg(long, value_name = "COMMAND|ADDRESS")]
         world: Option<WorldAddress>,

@@ -1,14 +1,13 @@
 //! Which values of a world are believed: those that this arm's sensors could have measured.
 
-use physics_model::BodyState;
 use physics_model::feasible::check_theta;
-use physics_model::theta::standard_com_m;
+use physics_model::{BodyState, ObjectShape, Theta};
 use push_task::sensor::observation_names;
 use push_task::{Observation, Particle, State};
 use scenario::Problem;
 
 use super::WorldError;
-use super::message::{Place, SceneAnswer, wrong};
+use super::message::{Drawn, Place, wrong};
 
 /// Beyond this an object is not on the table: the range of the published observation, ±m.
 const POSITION_RANGE_M: f64 = 10.0;
@@ -20,6 +19,8 @@ const QUATERNION_TOLERANCE: f64 = 0.01;
 const JOINT_TOLERANCE_RAD: f64 = 0.05;
 /// Turns of a continuous joint that are believed, rad.
 const JOINT_RANGE_RAD: f64 = 1000.0;
+/// How far a body settles where it is put, m.
+const STANDING_M: f64 = 0.005;
 /// How far from `tool_start_m` the tool may start, in lengths of a move.
 const START_TOLERANCE_MOVES: f64 = 1.0;
 
@@ -109,32 +110,49 @@ pub(super) fn start(request: &'static str, problem: &Problem, joints_rad: &[f64]
     Err(wrong(request, "joints_rad", &expectation))
 }
 
-/// What the world says it has drawn, as a particle: for statistics of a belief.
-pub(super) fn scene(
+/// What the world says it has drawn, as a particle: for statistics of a belief. It has to be what `first`, the observation, shows.
+pub(super) fn drawn(
     request: &'static str,
-    joints_rad: &[f64],
+    problem: &Problem,
+    (observation, joints_rad): (&Observation, &[f64]),
     has_obstacle: Option<bool>,
-    answer: SceneAnswer,
+    answer: Drawn,
 ) -> Result<Particle, WorldError> {
-    let SceneAnswer { mut theta, object, obstacle } = answer;
-    theta.object.com_m = standard_com_m(theta.object.shape, theta.object.com_m);
-    check_theta(&theta).map_err(|error| wrong(request, "scene.theta", &error.to_string()))?;
+    let Drawn { theta, object, obstacle } = answer;
+    if !theta.effects.is_empty() {
+        return Err(wrong(request, "drawn.theta.effects", "expected none"));
+    }
+    check_theta(&theta).map_err(|error| wrong(request, "drawn.theta", &error.to_string()))?;
+    // Without sizes that its shapes do not have, and with the frame of a sphere that is taken here.
+    let theta = Theta::from_parts(&theta.continuous(), theta.classes());
     let with = theta.obstacle.is_some();
     if obstacle.is_some() != with {
-        return Err(wrong(request, "scene.obstacle", "expected a place where theta has an obstacle, and only there"));
+        return Err(wrong(request, "drawn.obstacle", "expected a place where theta has an obstacle, and only there"));
     }
-    if has_obstacle.is_some_and(|said| said != with) {
-        return Err(wrong(request, "has_obstacle", "expected what scene says"));
+    if let Some(said) = has_obstacle.filter(|said| *said != with) {
+        return Err(wrong(request, "has_obstacle", &format!("expected {with}, as drawn.theta has it, found {said}")));
     }
-    let body = |field: &str, place: Place| {
-        let inside = place.position_m.iter().all(|v| (-POSITION_RANGE_M..=POSITION_RANGE_M).contains(v));
-        if inside && place.yaw_rad.is_finite() {
-            return Ok(BodyState::at_rest(place.position_m, place.yaw_rad));
+    let table_m = problem.scenario.world.table_height_m;
+    let body = |field: &str, place: &Place, shape: ObjectShape, size_m: [f64; 3]| {
+        let Place { position_m: [x, y, z], yaw_rad } = *place;
+        let height_m = table_m + shape.half_height_m(size_m);
+        let inside = [x, y].iter().all(|v| (-POSITION_RANGE_M..=POSITION_RANGE_M).contains(v)) && yaw_rad.is_finite();
+        if inside && (z - height_m).abs() <= STANDING_M {
+            return Ok(BodyState::at_rest([x, y, z], yaw_rad));
         }
-        let expectation = format!("expected a position within {POSITION_RANGE_M} m and a finite yaw, found {place:?}");
-        Err(wrong(request, field, &expectation))
+        let range = format!("expected a finite yaw and a position within {POSITION_RANGE_M} m");
+        Err(wrong(request, field, &format!("{range}, {height_m} m high as it stands on the table, found {place:?}")))
     };
-    let object = body("scene.object", object)?;
-    let obstacle = obstacle.map(|place| body("scene.obstacle", place)).transpose()?;
+    let o = &theta.object;
+    let object = body("drawn.object", &object, o.shape, o.size_m)?;
+    let seen = observation.object_pose().0;
+    let off_m = (seen[0] - object.position_m[0]).hypot(seen[1] - object.position_m[1]);
+    let limit_m = STANDING_M + 8.0 * problem.scenario.sensor.noise.position_m;
+    if off_m > limit_m {
+        let expectation = format!("expected the object within {limit_m} m of where it is observed, found {off_m} m");
+        return Err(wrong(request, "drawn.object", &expectation));
+    }
+    let obstacle = theta.obstacle.as_ref().zip(obstacle);
+    let obstacle = obstacle.map(|(o, place)| body("drawn.obstacle", &place, o.shape, o.size_m)).transpose()?;
     Ok(Particle::new(State { joints_rad: joints_rad.to_vec(), object, obstacle }, theta))
 }

@@ -161,13 +161,13 @@ pub(super) struct ResetAnswer {
     pub(super) joints_rad: Option<Vec<f64>>,
     pub(super) tool_m: Option<[f64; 3]>,
     pub(super) has_obstacle: Option<bool>,
-    pub(super) scene: Option<SceneAnswer>,
+    pub(super) drawn: Option<Drawn>,
 }
 
 /// What a simulated world has drawn.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct SceneAnswer {
+pub(super) struct Drawn {
     pub(super) theta: Theta,
     pub(super) object: Place,
     pub(super) obstacle: Option<Place>,
@@ -268,7 +268,7 @@ mod tests {
     use super::*;
     use crate::external::{check, identity};
 
-    /// The JSON blocks of the documentation: hello, its answer, reset, its answer, a scene, act, its answer,
+    /// The JSON blocks of the documentation: hello, its answer, reset, its answer, the same with what was drawn, act, its answer,
     /// error, close.
     fn documented(root: &Path) -> Vec<String> {
         let text = std::fs::read_to_string(root.join("docs/src/reference/world-protocol.md")).unwrap();
@@ -321,12 +321,11 @@ mod tests {
         let near = &problem.start_joints_rad;
         let joints = check::joints("reset", &problem, near, reset.joints_rad, reset.tool_m).unwrap();
         check::start("reset", &problem, &joints).unwrap();
-        // The scene stands by itself there, and is a key of the answer.
-        let mut answer: Value = serde_json::from_str(&line(3)).unwrap();
-        answer["reset"]["scene"] = serde_json::from_str::<Value>(&line(4)).unwrap()["scene"].take();
-        let Answer::Reset(reset) = Answer::parse("reset", &answer.to_string()).unwrap() else { panic!("a reset") };
-        let scene = check::scene("reset", &joints, reset.has_obstacle, reset.scene.unwrap()).unwrap();
-        assert_eq!(scene.state.obstacle.unwrap().position_m, [0.53, 0.05, 0.045]);
+        let Answer::Reset(reset) = Answer::parse("reset", &line(4)).unwrap() else { panic!("a reset") };
+        let observation = check::observation("reset", &problem, reset.observation).unwrap();
+        let first = (&observation, joints.as_slice());
+        let drawn = check::drawn("reset", &problem, first, reset.has_obstacle, reset.drawn.unwrap()).unwrap();
+        assert_eq!(drawn.state.obstacle.unwrap().position_m, [0.53, 0.05, 0.045]);
         let Answer::Act(act) = Answer::parse("act", &line(6)).unwrap() else { panic!("an act") };
         check::observation("act", &problem, act.observation).unwrap();
         check::joints("act", &problem, near, act.joints_rad, act.tool_m).unwrap();

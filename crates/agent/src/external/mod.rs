@@ -90,7 +90,7 @@ impl ExternalWorld {
             joints_rad: problem.start_joints_rad.clone(),
             object_moved: false,
             has_obstacle: None,
-            scene: None,
+            drawn: None,
         }
     }
 }
@@ -140,7 +140,7 @@ pub struct ExternalEpisode<'a> {
     joints_rad: Vec<f64>,
     object_moved: bool,
     has_obstacle: Option<bool>,
-    scene: Option<Particle>,
+    drawn: Option<Particle>,
 }
 
 impl ExternalEpisode<'_> {
@@ -152,8 +152,8 @@ impl ExternalEpisode<'_> {
 
     /// Parameters and first places of what the world has drawn, where it says so: for statistics, never for a method.
     #[must_use]
-    pub fn scene(&self) -> Option<&Particle> {
-        self.scene.as_ref()
+    pub fn drawn(&self) -> Option<&Particle> {
+        self.drawn.as_ref()
     }
 
     fn try_reset(&mut self) -> Result<(Observation, Vec<f64>), WorldError> {
@@ -167,9 +167,10 @@ impl ExternalEpisode<'_> {
         let near = &self.problem.start_joints_rad;
         self.joints_rad = check::joints("reset", self.problem, near, answer.joints_rad, answer.tool_m)?;
         check::start("reset", self.problem, &self.joints_rad)?;
-        let scene = |scene| check::scene("reset", &self.joints_rad, answer.has_obstacle, scene);
-        self.scene = answer.scene.map(scene).transpose()?;
-        let said = self.scene.as_ref().map(|scene| scene.theta.obstacle.is_some());
+        let first = (&observation, self.joints_rad.as_slice());
+        let drawn = |drawn| check::drawn("reset", self.problem, first, answer.has_obstacle, drawn);
+        self.drawn = answer.drawn.map(drawn).transpose()?;
+        let said = self.drawn.as_ref().map(|drawn| drawn.theta.obstacle.is_some());
         (self.steps, self.object_moved, self.has_obstacle) = (0, false, answer.has_obstacle.or(said));
         Ok((observation, self.joints_rad.clone()))
     }
@@ -230,7 +231,7 @@ impl World for ExternalEpisode<'_> {
         })
     }
 
-    /// Nobody knows.
+    /// Nobody knows: what a world says it has drawn is for statistics.
     fn truth(&self) -> Option<&Particle> {
         None
     }

@@ -76,10 +76,10 @@ fn observation(hello: &Value) -> Value {
     json!(values)
 }
 
-/// A scene with one fault, or none.
-fn scene(fault: &str, answer: &mut Value) -> Value {
+/// What was drawn, with one fault or none.
+fn drawn(fault: &str, answer: &mut Value) -> Value {
     let size = [0.08, 0.08, 0.09];
-    let mut scene = json!({
+    let mut drawn = json!({
         "theta": {
             "object": {"shape": "box", "mass_kg": 0.5, "size_m": size, "com_m": [0.0, 0.0, 0.0], "friction": 0.4},
             "obstacle": {"shape": "box", "mass_kg": 1.0, "size_m": size},
@@ -88,13 +88,14 @@ fn scene(fault: &str, answer: &mut Value) -> Value {
         "obstacle": {"position_m": [0.53, 0.05, 0.045], "yaw_rad": 0.0},
     });
     match fault {
-        "scene-grams" => scene["theta"]["object"]["mass_kg"] = json!(500.0),
-        "scene-nowhere" => scene["obstacle"] = Value::Null,
-        "scene-denied" => answer["has_obstacle"] = json!(false),
-        "scene-far" => scene["object"]["position_m"][0] = json!(460.0),
+        "drawn-grams" => drawn["theta"]["object"]["mass_kg"] = json!(500.0),
+        "drawn-nowhere" => drawn["obstacle"] = Value::Null,
+        "drawn-denied" => answer["has_obstacle"] = json!(false),
+        "drawn-low" => drawn["object"]["position_m"][2] = json!(0.09),
+        "drawn-far" => drawn["object"]["position_m"][0] = json!(0.43),
         _ => {}
     }
-    scene
+    drawn
 }
 
 /// Spoils `answer`, or returns the text to send in its place, or never returns.
@@ -194,7 +195,7 @@ fn spoil(fault: &str, answer: &mut Value) -> bool {
             let x = answer["observation"].as_array().expect("values").len() - 7;
             answer["observation"][x] = json!(1e6);
         }
-        fault if fault.starts_with("scene") => answer["scene"] = scene(fault, answer),
+        fault if fault.starts_with("drawn") => answer["drawn"] = drawn(fault, answer),
         "wrong-trial" => answer["trial"] = json!(77),
         "wrong-step" => answer["step"] = json!(77),
         "outcome" => answer["outcome"] = json!("won"),

@@ -1,18 +1,19 @@
 //! One world: an episode, and what each source says of it at each step.
 
 use agent::{
-    Agent, Estimate, ExternalEpisode, ExternalWorld, Method, Network, SimulatedWorld, StepView, Watcher,
-    World as Acted, WorldStep,
+    Agent, Episode, Estimate, ExternalEpisode, Method, Network, SimulatedWorld, StepView, Watcher, World as Acted,
+    WorldStep,
 };
-use anyhow::{Context as _, Result, bail};
+use anyhow::{Result, bail};
 use belief::Particles;
+use physics_model::config::ObstacleMobility;
 use pomdp::{Belief as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
 use push_task::{Action, Observation, Particle};
 use rand::RngExt as _;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
-use super::Place;
+use super::{External, FAILED};
 
 /// Draws from prior and network at each step.
 const DRAWS: usize = 100;
@@ -53,10 +54,13 @@ pub struct Row {
 }
 
 /// A world.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct World {
     /// Why the episode ended.
     pub reason: String,
+    /// What an external world did wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
     /// Σ γ^t r_t.
     pub discounted_return: f64,
     /// Whether there is an obstacle.
@@ -94,7 +98,7 @@ impl Watcher for Onlooker {
         let Some(belief) = view.belief else { return };
         self.rows.push(row(belief, truth, &mut self.rng));
         if let Some(step) = view.step {
-            self.steps.push((step.action, step.observation.clone(), truth.state.joints_rad.clone()));
+            self.steps.push((step.action, step.observation.clone(), view.joints_rad.to_vec()));
             if let Some(update) = &step.update {
                 self.transitions.push(update.transitions);
                 self.exponents.push(update.temperature);
@@ -132,27 +136,39 @@ impl<W: Acted> Acted for Opened<W> {
     }
 }
 
+/// Seed of world `number`: that of a trial of `eval`.
+pub(super) fn seed(root: u64, number: u32) -> Seed {
+    Seed(root).child(Purpose::World, u64::from(number))
+}
+
 /// Plays world `number`.
 pub(super) fn play(
     problem: &Problem,
     network: &Network,
-    root: Seed,
+    root: u64,
     number: u32,
-    place: Option<&Place>,
+    external: Option<&External>,
 ) -> Result<World> {
-    let seed = root.child(Purpose::World, u64::from(number));
-    let Some(Place { address, timeouts }) = place else {
+    let seed = seed(root, number);
+    let Some(external) = external else {
         let start = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
         let world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
-        return played(problem, network, seed, Opened::new(world, Acted::truth));
+        return played(problem, network, seed, Opened::new(world, Acted::truth), true);
     };
-    let mut world = ExternalWorld::start(address, *timeouts, problem)?;
-    // The seed of a trial of `eval --world`: the same scene.
+    let mut world = external.start(problem)?;
     let episode = world.episode(problem, number, seed.0);
-    played(problem, network, seed, Opened::new(episode, ExternalEpisode::scene))
+    let stays = problem.scenario.world.obstacle_mobility == ObstacleMobility::Fixed;
+    played(problem, network, seed, Opened::new(episode, ExternalEpisode::drawn), stays)
 }
 
-fn played<W: Acted>(problem: &Problem, network: &Network, seed: Seed, mut world: Opened<W>) -> Result<World> {
+/// `follows`: the truth says where the obstacle is, not only where it was at first.
+fn played<W: Acted>(
+    problem: &Problem,
+    network: &Network,
+    seed: Seed,
+    mut world: Opened<W>,
+    follows: bool,
+) -> Result<World> {
     let mut onlooker = Onlooker {
         truth: None,
         rows: Vec::new(),
@@ -163,17 +179,19 @@ fn played<W: Acted>(problem: &Problem, network: &Network, seed: Seed, mut world:
     };
     #[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
     let started = std::time::Instant::now();
-    let episode = Agent::new(problem, Method::Mixture, Some(network))?.run_watched(&mut world, seed, &mut onlooker)?;
-    let seconds = started.elapsed().as_secs_f64() / episode.steps.len().max(1) as f64;
-    if let Some(failure) = episode.failure {
-        bail!(failure);
-    }
-    let (observation, joints_rad) = world.first.context("an episode begins with a reset")?;
-    let Some(start) = onlooker.truth else {
-        bail!(
-            "the world does not say what it has drawn: expected `scene` in its answer to `reset` (docs/src/reference/world-protocol.md)"
-        );
+    let mut agent = Agent::new(problem, Method::Mixture, Some(network))?;
+    let episode = match agent.run_watched(&mut world, seed, &mut onlooker) {
+        // What it first measured cannot be: an object inside the tool, for example.
+        Err(agent::Error::Scenario(error)) => Episode::failed(format!("the first observation and the task: {error}")),
+        played => played?,
     };
+    let seconds = started.elapsed().as_secs_f64() / episode.steps.len().max(1) as f64;
+    let (Some((observation, joints_rad)), Some(start), None) = (world.first, onlooker.truth, &episode.failure) else {
+        return Ok(World { reason: FAILED.into(), failure: episode.failure, ..World::default() });
+    };
+    if !follows {
+        onlooker.rows.iter_mut().skip(1).for_each(|row| row.obstacle_m = None);
+    }
 
     let mut rng = seed.stream(Purpose::Statistics, 1);
     let Network::Posterior(network) = network else { bail!("expected the network of a bridge filter") };
@@ -200,6 +218,7 @@ fn played<W: Acted>(problem: &Problem, network: &Network, seed: Seed, mut world:
         |row: &agent::StepRecord| row.large_force || row.obstacle_touched || moved(&row.observation, &observation);
     Ok(World {
         reason: episode.reason.name().into(),
+        failure: None,
         discounted_return: episode.discounted_return,
         has_obstacle: start.theta.obstacle.is_some(),
         first_contact: episode.steps.iter().position(touched).map(|index| index + 1),

@@ -17,6 +17,15 @@ const COLUMNS: [(&str, &str, usize); 8] = [
     ("obstacle_m", "obstacle off, m", 3),
 ];
 
+/// In which world of others it was played, and what it did not bring to an end.
+fn external(provenance: &Value) -> String {
+    let [name, version] = ["name", "version"].map(|key| provenance["world"][key].as_str().unwrap_or_default());
+    if name.is_empty() {
+        return String::new();
+    }
+    format!(", played in {name} {version}, where {} failed", provenance["failed"])
+}
+
 /// The summary as a page.
 #[must_use]
 pub fn table(summary: &Value) -> String {
@@ -27,7 +36,7 @@ pub fn table(summary: &Value) -> String {
         p["robot"].as_str().unwrap_or_default(),
         p["worlds"],
         p["seed"],
-        p["world"]["name"].as_str().map(|name| format!(", played in {name}")).unwrap_or_default(),
+        external(p),
         p["preset"].as_str().unwrap_or_default()
     );
     text += "| step | belief |";

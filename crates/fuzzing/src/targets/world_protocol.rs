@@ -53,7 +53,11 @@ fn session(address: SocketAddr) -> Verdict {
         assert_eq!(joints.len(), problem.model.joint_count(), "one value a joint");
     };
     match episode.reset() {
-        Ok((observation, joints)) => check(&observation.0, &joints),
+        Ok((observation, joints)) => {
+            check(&observation.0, &joints);
+            let drawn = episode.drawn().map(|drawn| drawn.theta.continuous());
+            assert!(drawn.iter().flatten().all(|value| value.is_finite()), "{drawn:?}");
+        }
         Err(error) => return refused(&error, &["the world"]),
     }
     match episode.act(Action::ALL[2]) {
@@ -75,7 +79,7 @@ fn problem() -> &'static Problem {
     })
 }
 
-/// The session of the documentation, twice, and one in which the world reports the tool.
+/// The session of the documentation, twice, one in which the world reports the tool, and one in which it says what it has drawn.
 ///
 /// # Panics
 ///
@@ -89,10 +93,11 @@ pub fn seeds() -> Vec<Vec<u8>> {
         .filter_map(|block| block.split("```").next())
         .map(|block| block.trim().replace('\n', " "))
         .collect();
-    // The blocks are hello, its answer, reset, its answer, act, its answer, error, close.
+    // The blocks are hello, its answer, reset, its answer, the same with what was drawn, act, its answer, error, close.
     let session = |answers: [&str; 3]| answers.map(|answer| format!("{answer}\n")).concat().into_bytes();
-    let documented = session([&blocks[1], &blocks[3], &blocks[5]]);
+    let documented = session([&blocks[1], &blocks[3], &blocks[6]]);
+    let drawn = session([&blocks[1], &blocks[4], &blocks[6]]);
     let tool = blocks[3]
         .replace("\"joints_rad\": [0.6333, 2.117, 4.57, 0.2087, -0.8013, 0.842]", "\"tool_m\": [0.46, -0.26, 0.05]");
-    vec![documented.clone(), documented, session([&blocks[1], &tool, &blocks[5]])]
+    vec![documented.clone(), documented, session([&blocks[1], &tool, &blocks[6]]), drawn]
 }
