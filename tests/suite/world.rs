@@ -156,13 +156,13 @@ fn worlds_that_cannot_be_used_are_bad_input_and_nothing_is_written() {
 #[test]
 fn how_far_a_belief_can_be_trusted_is_measured_in_a_world_that_says_what_it_has_drawn() {
     let folder = tempfile::tempdir().unwrap();
-    let calibration = |world: &str, out: &str| {
+    let calibration = |world: &[&str], out: &str| {
         let task = "calibration --domain obstacle --robot jaco --set task.horizon=3 --worlds 2 --seed 9";
         let mut command = program("bench");
-        command.args(task.split_whitespace()).args(["--world", world, "--out"]).arg(folder.path().join(out));
+        command.args(task.split_whitespace()).args(world).arg("--out").arg(folder.path().join(out));
         command.output().unwrap()
     };
-    let output = calibration(&misbehaving("reset-drawn"), "drawn");
+    let output = calibration(&["--world", &misbehaving("reset-drawn")], "drawn");
     assert!(output.status.success(), "{}", stderr(&output));
     let read = |name: &str| std::fs::read_to_string(folder.path().join("drawn").join(name)).unwrap();
     let summary: Value = serde_json::from_str(&read("calibration.json")).unwrap();
@@ -170,10 +170,10 @@ fn how_far_a_belief_can_be_trusted_is_measured_in_a_world_that_says_what_it_has_
     assert_eq!((&provenance["world"]["name"], &provenance["failed"]), (&Value::from("misbehaving"), &Value::from(0)));
     assert_eq!(last["mass_coverage_90"]["n"], 2, "{last}");
     assert!(read("calibration.md").contains("played in misbehaving 1.0, where 0 failed"));
-    // Another world does not go on with it, and one that says nothing is refused before anything is played.
-    let other = calibration(&misbehaving("reset-drawn -"), "drawn");
+    // Another world does not go on with it, here the simulated one; one that says nothing is refused before anything is played.
+    let other = calibration(&[], "drawn");
     assert!(!other.status.success() && stderr(&other).contains("another world"), "{}", stderr(&other));
-    let silent = calibration(&misbehaving("good"), "silent");
+    let silent = calibration(&["--world", &misbehaving("good")], "silent");
     assert!(!silent.status.success() && stderr(&silent).contains("`drawn`"), "{}", stderr(&silent));
     assert!(!folder.path().join("silent").exists());
 }

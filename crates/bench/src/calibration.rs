@@ -73,6 +73,11 @@ impl External {
         Ok(world)
     }
 
+    /// What it says it is. How it was reached says nothing of a result.
+    fn name(&self) -> Value {
+        json!({ "name": self.identity.name, "version": self.identity.version })
+    }
+
     /// A socket is one world: as `eval` does, its episodes are played in turn.
     fn is_one(&self) -> bool {
         matches!(self.address, WorldAddress::Tcp(_))
@@ -103,7 +108,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     });
     let external = world.as_ref().map(|address| External::new(address, &problem, from.seed, 0)).transpose()?;
     if let Some(external) = &external {
-        identity["world"] = json!(external.identity);
+        identity["world"] = external.name();
     }
     let own = out.join("task.json");
     if own.exists() {
@@ -146,7 +151,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
         "set": from.overrides.set, "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
     });
     if let Some(external) = &external {
-        provenance["world"] = json!(external.identity);
+        provenance["world"] = external.name();
         provenance["failed"] = json!(failed.len());
     }
     let summary = summary::summary(&played, &provenance);
