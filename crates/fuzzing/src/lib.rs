@@ -33,11 +33,12 @@ pub struct Target {
 }
 
 /// All readers.
-pub const TARGETS: [Target; 8] = [
+pub const TARGETS: [Target; 9] = [
     Target { name: "scenario_toml", body: targets::scenario_toml::scenario_toml, seeds: targets::scenario_toml::seeds },
     Target { name: "robot", body: targets::robot::robot, seeds: targets::robot::seeds },
     Target { name: "dataset_shard", body: targets::dataset_shard::dataset_shard, seeds: targets::dataset_shard::seeds },
     Target { name: "checkpoint", body: targets::checkpoint::checkpoint, seeds: targets::checkpoint::seeds },
+    Target { name: "posterior", body: targets::posterior::posterior, seeds: targets::posterior::seeds },
     Target { name: "import_log", body: targets::import_log::import_log, seeds: targets::import_log::seeds },
     Target { name: "measured_log", body: targets::measured_log::measured_log, seeds: targets::measured_log::seeds },
     Target { name: "model_toml", body: targets::model_toml::model_toml, seeds: targets::model_toml::seeds },

@@ -55,6 +55,11 @@ fn priors_are_read_or_refused() {
 }
 
 #[test]
+fn networks_of_bridge_filters_are_read_or_refused() {
+    run("posterior", 2000, MOST_BYTES);
+}
+
+#[test]
 fn recordings_of_others_are_imported_or_refused() {
     run("import_log", 2000, MOST_BYTES);
 }

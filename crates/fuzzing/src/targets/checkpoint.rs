@@ -67,7 +67,7 @@ fn check(checkpoint: &Checkpoint, copy: &Path) {
 }
 
 /// The plain file that a manifest names.
-fn named(manifest: &[u8]) -> Option<String> {
+pub(super) fn named(manifest: &[u8]) -> Option<String> {
     let manifest: Value = serde_json::from_slice(manifest).ok()?;
     let name = manifest.get("weights")?.get("name")?.as_str()?;
     let plain = name.len() < 200 && name.starts_with("weights") && !name.contains(['/', '\\', '\0']);
@@ -75,7 +75,7 @@ fn named(manifest: &[u8]) -> Option<String> {
 }
 
 /// The manifest with size and hash of the weights.
-fn matching(manifest: &[u8], weights: &[u8]) -> Option<Vec<u8>> {
+pub(super) fn matching(manifest: &[u8], weights: &[u8]) -> Option<Vec<u8>> {
     let mut manifest: Value = serde_json::from_slice(manifest).ok()?;
     let entry = manifest.get_mut("weights")?.as_object_mut()?;
     entry.insert("bytes".into(), weights.len().into());

@@ -5,6 +5,7 @@ pub mod dataset_shard;
 pub mod import_log;
 pub mod measured_log;
 pub mod model_toml;
+pub mod posterior;
 pub mod robot;
 pub mod scenario_toml;
 pub mod world_protocol;

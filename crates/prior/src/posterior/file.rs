@@ -22,6 +22,9 @@ pub const FILE: &str = "posterior.json";
 const VERSION: u64 = 1;
 /// Widest LSTM, most hidden units and components of a coordinate.
 const MOST: usize = 4096;
+/// No training makes larger weights or divides by less, and with these no sum of a layer overflows.
+const MOST_WEIGHT: f32 = 1e6;
+const LEAST_STDDEV: f32 = 1e-6;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -98,14 +101,14 @@ pub(super) fn load(folder: &Path) -> Result<Weights, Error> {
     let bytes = files::read_blob(folder, &manifest.weights)?;
     let Parameters { tensors } =
         files::from_safetensors(&bytes, &manifest.tensors(), &folder.join(&manifest.weights.name))?;
-    if tensors.iter().flatten().any(|weight| !weight.is_finite()) {
-        return Err(refuse("names weights that are not finite".into()));
+    if let Some(weight) = tensors.iter().flatten().find(|weight| weight.is_nan() || weight.abs() > MOST_WEIGHT) {
+        return Err(refuse(format!("weights: expected at most {MOST_WEIGHT} in size, found {weight}")));
     }
     let mut tensors = tensors.into_iter();
     let mut next = || tensors.next().unwrap_or_default();
     let normalisation: Vec<(f32, f32)> = next().into_iter().zip(next()).collect();
-    if normalisation.iter().any(|(_, stddev)| *stddev <= 0.0) {
-        return Err(refuse("names input.stddev that is not above 0".into()));
+    if let Some((_, stddev)) = normalisation.iter().find(|(_, stddev)| *stddev < LEAST_STDDEV) {
+        return Err(refuse(format!("input.stddev: expected at least {LEAST_STDDEV}, found {stddev}")));
     }
     let layers = manifest.hidden.iter().map(|_| Layer { weights: next(), bias: next() }).collect();
     let head = Head {
