@@ -172,8 +172,20 @@ fn how_far_a_belief_can_be_trusted_is_measured_in_a_world_that_says_what_it_has_
     assert!(read("calibration.md").contains("played in misbehaving 1.0, where 0 failed"));
     // Another world does not go on with it, here the simulated one; one that says nothing is refused before anything is played.
     let other = calibration(&[], "drawn");
-    assert!(!other.status.success() && stderr(&other).contains("another world"), "{}", stderr(&other));
+    assert!(
+        !other.status.success() && stderr(&other).contains("(world {\"name\":\"misbehaving\""),
+        "{}",
+        stderr(&other)
+    );
     let silent = calibration(&["--world", &misbehaving("good")], "silent");
     assert!(!silent.status.success() && stderr(&silent).contains("`drawn`"), "{}", stderr(&silent));
     assert!(!folder.path().join("silent").exists());
+    // What fails is no world, and is tried again.
+    let failing = calibration(&["--world", &misbehaving("reset-drawn-far")], "failing");
+    let sentence = stderr(&failing);
+    assert!(!failing.status.success() && sentence.contains("every world failed"), "{sentence}");
+    assert!(sentence.contains("world 1: the world's answer to `reset`: `drawn.object`"), "{sentence}");
+    assert_eq!(std::fs::read_dir(folder.path().join("failing/worlds")).unwrap().count(), 0);
+    let again = calibration(&["--world", &misbehaving("reset-drawn")], "failing");
+    assert!(again.status.success(), "{}", stderr(&again));
 }

@@ -120,7 +120,7 @@ fn a_world_without_truth_refuses_the_oracle() {
 #[test]
 fn every_wrong_answer_names_its_message_and_field() {
     let problem = problem("jaco");
-    let cases: [(&str, &[&str]); 39] = [
+    let cases: [(&str, &[&str]); 41] = [
         ("act-nonsense", &["`act`", "expected"]),
         ("act-empty", &["`act`", "the text ends before it is complete"]),
         ("act-array", &["`act`", "expected"]),
@@ -159,6 +159,8 @@ fn every_wrong_answer_names_its_message_and_field() {
         ("reset-drawn-denied", &["`reset`", "`has_obstacle`", "expected true", "found false"]),
         ("reset-drawn-low", &["`reset`", "`drawn.object`", "0.045 m high"]),
         ("reset-drawn-far", &["`reset`", "`drawn.object`", "where it is observed"]),
+        ("reset-drawn-wide", &["`reset`", "`drawn`", "outside it"]),
+        ("reset-drawn-sphere", &["`reset`", "`drawn`", "distribution of `hello`"]),
         ("reset-elsewhere", &["`reset`", "within 0.02 m of [0.46, -0.26, 0.05]"]),
     ];
     for (mode, parts) in cases {

@@ -27,6 +27,10 @@ pub use table::table;
 const PRESET: &str = "surmise";
 /// How long an external world may take for an answer.
 const WORLD_LIMIT: Duration = Duration::from_secs(60);
+/// What is missing in an answer.
+const NO_DRAWN: &str = "expected `drawn` in its answer to `reset` (docs/src/reference/world-protocol.md)";
+/// Keys of `task.json` that have to be those of the task.
+const OF_TASK: [&str; 4] = ["scenario", "seed", "network", "world"];
 /// Reason of an episode that an external world did not bring to an end.
 const FAILED: &str = "world-failed";
 /// Most bytes of a world's file.
@@ -55,14 +59,14 @@ struct External {
 }
 
 impl External {
-    /// Starts it, and sets up world `number`, to see whether it says what it has drawn.
+    /// Starts it, and sets up world `number`, to see whether it says what it has drawn. What else may be wrong with that world costs one world.
     fn new(address: &WorldAddress, problem: &Problem, seed: u64, number: u32) -> Result<Self> {
         let mut world = ExternalWorld::start(address, timeouts(), problem)?;
         let identity = world.identity().clone();
         let mut episode = world.episode(problem, number, episode::seed(seed, number).0);
-        episode.reset()?;
-        let expectation = "expected `drawn` in its answer to `reset` (docs/src/reference/world-protocol.md)";
-        ensure!(episode.drawn().is_some(), "the world {} does not say what it has drawn: {expectation}", identity.name);
+        let answered = episode.reset().is_ok();
+        let silent = format!("the world {} does not say what it has drawn: {NO_DRAWN}", identity.name);
+        ensure!(!answered || episode.drawn().is_some(), silent);
         Ok(Self { address: address.clone(), identity })
     }
 
@@ -88,9 +92,6 @@ fn timeouts() -> Timeouts {
     Timeouts { start: WORLD_LIMIT, reset: WORLD_LIMIT, act: WORLD_LIMIT }
 }
 
-/// What is written beside the worlds.
-const RESULTS: [&str; 4] = ["calibration.json", "calibration.md", "calibration.svg", "calibration.png"];
-
 /// Plays the worlds that `out` does not have yet, and writes `calibration.json`, `calibration.md` and pictures there.
 ///
 /// # Errors
@@ -111,21 +112,29 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
         identity["world"] = external.name();
     }
     let own = out.join("task.json");
+    let mut commit = json!(scenario::commit(root));
     if own.exists() {
         let found: Value = serde_json::from_slice(&whole_file::read(&own, MOST_BYTES)?)
             .with_context(|| format!("{} is no task of this benchmark: move it away", own.display()))?;
-        let other =
-            ["scenario", "seed", "network", "world"].into_iter().find(|key| found.get(key) != identity.get(key));
-        let other = other.map_or(String::new(), |key| format!(" (another {key})"));
-        ensure!(found == identity, "{} holds the worlds of another task{other}: choose another folder", out.display());
-    } else {
-        if let Some(file) = RESULTS.iter().find(|file| out.join(file).exists()) {
-            bail!("{} holds {file}, which this benchmark did not write: choose another folder", out.display());
+        if let Some(key) = OF_TASK.into_iter().find(|key| found.get(key) != identity.get(key)) {
+            let (there, here) = (short(&found, key), short(&identity, key));
+            let place = out.display();
+            bail!("{place} holds the worlds of another task ({key}{there}, here{here}): choose another folder");
         }
-        std::fs::create_dir_all(out.join("worlds"))
-            .with_context(|| format!("cannot make the folder {}", out.display()))?;
+        // That of the worlds, not that of whoever counts them.
+        commit = found.get("commit").cloned().unwrap_or(commit);
+    } else {
+        let mut there = std::fs::read_dir(out).into_iter().flatten().flatten();
+        if let Some(file) = there.next() {
+            let (place, file) = (out.display(), file.file_name());
+            bail!("{place} holds {}, which this benchmark did not write: choose another folder", file.display());
+        }
+        std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
+        identity["commit"] = commit.clone();
         whole_file::write(&own, pretty(&identity).as_bytes(), Existing::Keep)?;
     }
+    std::fs::create_dir_all(out.join("worlds"))
+        .with_context(|| format!("cannot make the folder {}", out.join("worlds").display()))?;
     let one = |number: u32| -> Result<World> {
         let path = out.join(format!("worlds/{number:04}.json"));
         if path.exists() {
@@ -134,6 +143,11 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
         }
         let world = episode::play(&problem, &network, from.seed, number, external.as_ref())
             .with_context(|| format!("world {number}"))?;
+        // What failed is tried again by the next call.
+        if let Some(failure) = &world.failure {
+            note(&format!("world {number}: {failure}"));
+            return Ok(world);
+        }
         whole_file::write(&path, serde_json::to_string(&world)?.as_bytes(), Existing::Replace)?;
         note(&format!("world {number}: {} after {} actions", world.reason, world.filter.len().saturating_sub(1)));
         Ok(world)
@@ -148,7 +162,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     ensure!(!played.is_empty(), "every world failed: {}", failed[0].failure.as_deref().unwrap_or_default());
     let mut provenance = json!({
             "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": from.seed,
-        "set": from.overrides.set, "quick": quick, "network": network.hash(), "commit": scenario::commit(root),
+        "set": from.overrides.set, "quick": quick, "network": network.hash(), "commit": commit,
     });
     if let Some(external) = &external {
         provenance["world"] = external.name();
@@ -159,6 +173,12 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     whole_file::write(&out.join("calibration.md"), table(&summary).as_bytes(), Existing::Replace)?;
     figures::save(&summary, out)?;
     Ok(summary)
+}
+
+/// A key's value where it is short enough for a sentence.
+fn short(task: &Value, key: &str) -> String {
+    let text = task.get(key).map_or_else(|| "none".into(), Value::to_string);
+    if text.len() < 100 { format!(" {text}") } else { String::new() }
 }
 
 fn pretty(value: &Value) -> String {

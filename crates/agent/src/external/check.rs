@@ -2,8 +2,9 @@
 
 use physics_model::feasible::check_theta;
 use physics_model::{BodyState, ObjectShape, Theta};
+use pomdp::{Purpose, Seed};
 use push_task::sensor::observation_names;
-use push_task::{Observation, Particle, State};
+use push_task::{Coordinates, Observation, Particle, State};
 use scenario::Problem;
 
 use super::WorldError;
@@ -141,18 +142,30 @@ pub(super) fn drawn(
             return Ok(BodyState::at_rest([x, y, z], yaw_rad));
         }
         let range = format!("expected a finite yaw and a position within {POSITION_RANGE_M} m");
-        Err(wrong(request, field, &format!("{range}, {height_m} m high as it stands on the table, found {place:?}")))
+        let found = format!("found {:?} and {yaw_rad} rad", place.position_m);
+        Err(wrong(request, field, &format!("{range}, {height_m} m high as it stands on the table, {found}")))
     };
     let o = &theta.object;
     let object = body("drawn.object", &object, o.shape, o.size_m)?;
     let seen = observation.object_pose().0;
-    let off_m = (seen[0] - object.position_m[0]).hypot(seen[1] - object.position_m[1]);
-    let limit_m = STANDING_M + 8.0 * problem.scenario.sensor.noise.position_m;
+    let off_m = seen.iter().zip(object.position_m).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    let limit_m = STANDING_M + 6.0 * problem.scenario.sensor.noise.position_m;
     if off_m > limit_m {
         let expectation = format!("expected the object within {limit_m} m of where it is observed, found {off_m} m");
         return Err(wrong(request, "drawn.object", &expectation));
     }
     let obstacle = theta.obstacle.as_ref().zip(obstacle);
     let obstacle = obstacle.map(|(o, place)| body("drawn.obstacle", &place, o.shape, o.size_m)).transpose()?;
-    Ok(Particle::new(State { joints_rad: joints_rad.to_vec(), object, obstacle }, theta))
+    let [shape, class] = theta.classes();
+    let drawn = Particle::new(State { joints_rad: joints_rad.to_vec(), object, obstacle }, theta);
+    let (from, mut rng) = (&problem.worlds, Seed(0).stream(Purpose::Statistics, 0));
+    let has_classes = from.object.shape[shape] > 0.0 && from.obstacle.shape[class] > 0.0;
+    if !has_classes || Coordinates::new(&problem.model, from, joints_rad, observation).of(&drawn, &mut rng).is_none() {
+        return Err(wrong(
+            request,
+            "drawn",
+            "expected what the distribution of `hello` can give, found a value outside it",
+        ));
+    }
+    Ok(drawn)
 }

@@ -82,7 +82,7 @@ fn drawn(fault: &str, answer: &mut Value) -> Value {
     let mut drawn = json!({
         "theta": {
             "object": {"shape": "box", "mass_kg": 0.5, "size_m": size, "com_m": [0.0, 0.0, 0.0], "friction": 0.4},
-            "obstacle": {"shape": "box", "mass_kg": 1.0, "size_m": size},
+            "obstacle": {"shape": "box", "mass_kg": 1.0, "size_m": [0.05, 0.05, 0.09]},
         },
         "object": {"position_m": [0.46, -0.08, 0.045], "yaw_rad": 0.0},
         "obstacle": {"position_m": [0.53, 0.05, 0.045], "yaw_rad": 0.0},
@@ -91,6 +91,11 @@ fn drawn(fault: &str, answer: &mut Value) -> Value {
         "drawn-grams" => drawn["theta"]["object"]["mass_kg"] = json!(500.0),
         "drawn-nowhere" => drawn["obstacle"] = Value::Null,
         "drawn-denied" => answer["has_obstacle"] = json!(false),
+        "drawn-wide" => drawn["theta"]["object"]["size_m"][0] = json!(0.5),
+        "drawn-sphere" => {
+            drawn["theta"]["object"]["shape"] = json!("sphere");
+            drawn["theta"]["object"]["size_m"] = json!([0.045, 0.0, 0.0]);
+        }
         "drawn-low" => drawn["object"]["position_m"][2] = json!(0.09),
         "drawn-far" => drawn["object"]["position_m"][0] = json!(0.43),
         _ => {}

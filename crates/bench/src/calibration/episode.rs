@@ -13,7 +13,7 @@ use rand::RngExt as _;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
-use super::{External, FAILED};
+use super::{External, FAILED, NO_DRAWN};
 
 /// Draws from prior and network at each step.
 const DRAWS: usize = 100;
@@ -161,6 +161,10 @@ pub(super) fn play(
     played(problem, network, seed, Opened::new(episode, ExternalEpisode::drawn), stays)
 }
 
+fn failed(failure: String) -> World {
+    World { reason: FAILED.into(), failure: Some(failure), ..World::default() }
+}
+
 /// `follows`: the truth says where the obstacle is, not only where it was at first.
 fn played<W: Acted>(
     problem: &Problem,
@@ -187,7 +191,7 @@ fn played<W: Acted>(
     };
     let seconds = started.elapsed().as_secs_f64() / episode.steps.len().max(1) as f64;
     let (Some((observation, joints_rad)), Some(start), None) = (world.first, onlooker.truth, &episode.failure) else {
-        return Ok(World { reason: FAILED.into(), failure: episode.failure, ..World::default() });
+        return Ok(failed(episode.failure.unwrap_or_else(|| NO_DRAWN.into())));
     };
     if !follows {
         onlooker.rows.iter_mut().skip(1).for_each(|row| row.obstacle_m = None);
@@ -208,6 +212,9 @@ fn played<W: Acted>(
         let belief = Particles::uniform(drawn.take(DRAWS).collect())?;
         Ok(row(&belief, &start, &mut rng))
     };
+    if onlooker.rows.is_empty() {
+        return Ok(failed("no world of the distribution agrees with the first observation".into()));
+    }
     let (mut of_prior, mut of_network) = (vec![draws(&prior)?], vec![draws(&Estimate::network(&history, &network))?]);
     for (action, observation, joints_rad) in &onlooker.steps {
         network.observe(&problem.model, Some(*action), observation, joints_rad);
