@@ -64,6 +64,9 @@ impl Folder {
         {
             bail!("{}: holds {part} without plan.json: give another --out", root.display());
         }
+        if any_solver && !path.exists() {
+            bail!("{}: nothing to score: expected the plan.json of a benchmark", root.display());
+        }
         if path.exists() {
             // Another program's plan is no place for a lock.
             read::<Identity>(&path)?;

@@ -64,6 +64,16 @@ fn every_kind_of_set_is_a_log_that_can_be_read() {
 }
 
 #[test]
+fn what_is_no_benchmark_is_not_scored_and_no_folder_is_made() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path().join("nothing");
+    let identity =
+        Identity { options: options(0, 1, 0, 0, Actions::Passive), project: "0".into(), solver: String::new() };
+    let error = Folder::open(&root, &identity, true).unwrap_err().to_string();
+    assert!(error.contains("expected the plan.json of a benchmark") && !root.exists(), "{error}");
+}
+
+#[test]
 fn the_solver_is_told_nothing_of_the_truth() {
     let dir = tempfile::tempdir().unwrap();
     let identity =

@@ -60,7 +60,7 @@ struct Recording {
     #[arg(long, value_name = "MAP.toml", required_unless_present = "draft_map")]
     map: Option<PathBuf>,
     /// Writes a mapping from what the first source holds, with guesses and gaps marked, and imports nothing.
-    #[arg(long, value_name = "MAP.toml", conflicts_with_all = ["map", "out"])]
+    #[arg(long, value_name = "MAP.toml", conflicts_with_all = ["map", "out", "format"])]
     draft_map: Option<PathBuf>,
     /// Folder of the log; it must not hold one yet.
     #[arg(long, required_unless_present = "draft_map")]

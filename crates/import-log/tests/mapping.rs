@@ -277,6 +277,9 @@ fn the_program_drafts_imports_and_overwrites_nothing() {
     let (map, out) = (map.to_str().unwrap(), out.to_str().unwrap());
     let source = data().join("original/samples.csv");
     let source = source.to_str().unwrap();
+    // A draft has no format.
+    let refused = program(&["table", source, "--draft-map", map, "--format", "parquet"]);
+    assert_eq!((refused.status.code(), Path::new(map).exists()), (Some(2), false));
     assert!(program(&["table", source, "--draft-map", map]).status.success());
     let again = program(&["table", source, "--draft-map", map]);
     assert_eq!(again.status.code(), Some(2));
