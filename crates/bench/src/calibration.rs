@@ -31,8 +31,6 @@ const WORLD_LIMIT: Duration = Duration::from_secs(60);
 const NO_DRAWN: &str = "expected `drawn` in its answer to `reset` (docs/src/reference/world-protocol.md)";
 /// Keys of `task.json` that have to be those of the task.
 const OF_TASK: [&str; 4] = ["scenario", "seed", "network", "world"];
-/// Reason of an episode that an external world did not bring to an end.
-const FAILED: &str = "world-failed";
 /// Most bytes of a world's file.
 const MOST_BYTES: u64 = 1 << 24;
 
@@ -59,11 +57,11 @@ struct External {
 }
 
 impl External {
-    /// Starts it, and sets up world `number`, to see whether it says what it has drawn. What else may be wrong with that world costs one world.
-    fn new(address: &WorldAddress, problem: &Problem, seed: u64, number: u32) -> Result<Self> {
+    /// Starts it, and sets up world 0, to see whether it says what it has drawn. What else may be wrong with that world costs one world.
+    fn new(address: &WorldAddress, problem: &Problem, seed: u64) -> Result<Self> {
         let mut world = ExternalWorld::start(address, timeouts(), problem)?;
         let identity = world.identity().clone();
-        let mut episode = world.episode(problem, number, episode::seed(seed, number).0);
+        let mut episode = world.episode(problem, 0, episode::seed(seed, 0).0);
         let answered = episode.reset().is_ok();
         let silent = format!("the world {} does not say what it has drawn: {NO_DRAWN}", identity.name);
         ensure!(!answered || episode.drawn().is_some(), silent);
@@ -107,7 +105,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     let mut identity = json!({
         "scenario": scenario, "seed": from.seed, "network": network.hash(),
     });
-    let external = world.as_ref().map(|address| External::new(address, &problem, from.seed, 0)).transpose()?;
+    let external = world.as_ref().map(|address| External::new(address, &problem, from.seed)).transpose()?;
     if let Some(external) = &external {
         identity["world"] = external.name();
     }
@@ -158,10 +156,10 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
         (0..*worlds).into_par_iter().map(one).collect::<Result<_>>()?
     };
     // What failed is counted, and says nothing of a belief.
-    let (failed, played): (Vec<World>, Vec<World>) = played.into_iter().partition(|world| world.reason == FAILED);
+    let (failed, played): (Vec<World>, Vec<World>) = played.into_iter().partition(|world| world.failure.is_some());
     ensure!(!played.is_empty(), "every world failed: {}", failed[0].failure.as_deref().unwrap_or_default());
     let mut provenance = json!({
-            "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": from.seed,
+        "domain": scenario.name, "robot": scenario.robot.name, "preset": scenario.preset, "worlds": task.worlds, "seed": from.seed,
         "set": from.overrides.set, "quick": quick, "network": network.hash(), "commit": commit,
     });
     if let Some(external) = &external {

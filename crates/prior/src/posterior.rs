@@ -23,7 +23,7 @@ use push_task::{Action, Observation, PushModel};
 
 use crate::Error;
 use features::{Features, Seen};
-pub use features::{INPUTS, STEP_VALUES, step_values};
+pub use features::{STEP_VALUES, step_values};
 pub use file::FILE;
 use head::Head;
 pub use head::StartDensity;

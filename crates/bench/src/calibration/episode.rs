@@ -1,8 +1,8 @@
 //! One world: an episode, and what each source says of it at each step.
 
 use agent::{
-    Agent, Episode, Estimate, ExternalEpisode, Method, Network, SimulatedWorld, StepView, Watcher, World as Acted,
-    WorldStep,
+    Agent, Episode, Estimate, ExternalEpisode, Method, Network, Reason, SimulatedWorld, StepView, Watcher,
+    World as Acted, WorldStep,
 };
 use anyhow::{Result, bail};
 use belief::Particles;
@@ -13,7 +13,7 @@ use rand::RngExt as _;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
-use super::{External, FAILED, NO_DRAWN};
+use super::{External, NO_DRAWN};
 
 /// Draws from prior and network at each step.
 const DRAWS: usize = 100;
@@ -162,7 +162,7 @@ pub(super) fn play(
 }
 
 fn failed(failure: String) -> World {
-    World { reason: FAILED.into(), failure: Some(failure), ..World::default() }
+    World { reason: Reason::WorldFailed.name().into(), failure: Some(failure), ..World::default() }
 }
 
 /// `follows`: the truth says where the obstacle is, not only where it was at first.

@@ -15,8 +15,8 @@ use crate::Verdict;
 use crate::parts::{join, split};
 use crate::verdict::{folder, put, refused};
 
-/// Name of the weights where `prior.json` names none that is a plain file.
-const WEIGHTS: &str = "weights.safetensors";
+/// Name of the weights where a manifest names none that is a plain file.
+pub(super) const WEIGHTS: &str = "weights.safetensors";
 
 /// Loads the two files as they are, and once more with the recorded size and hash put right, so that what lies behind them sees the bytes too. What
 /// is accepted can be saved and loaded again to the same, and its network takes a step.
@@ -26,6 +26,11 @@ const WEIGHTS: &str = "weights.safetensors";
 /// Where the reader breaks its rule.
 #[must_use]
 pub fn checkpoint(data: &[u8]) -> Verdict {
+    once_more_with_its_hash(data, load)
+}
+
+/// Loads a manifest and weights as they are, and if they are refused with the recorded size and hash put right.
+pub(super) fn once_more_with_its_hash(data: &[u8], load: fn(&[u8], &[u8]) -> Verdict) -> Verdict {
     let [manifest, weights] = split::<2>(data);
     let verdict = load(manifest, weights);
     if let Some(manifest) = matching(manifest, weights)
@@ -75,7 +80,7 @@ pub(super) fn named(manifest: &[u8]) -> Option<String> {
 }
 
 /// The manifest with size and hash of the weights.
-pub(super) fn matching(manifest: &[u8], weights: &[u8]) -> Option<Vec<u8>> {
+fn matching(manifest: &[u8], weights: &[u8]) -> Option<Vec<u8>> {
     let mut manifest: Value = serde_json::from_slice(manifest).ok()?;
     let entry = manifest.get_mut("weights")?.as_object_mut()?;
     entry.insert("bytes".into(), weights.len().into());

@@ -7,7 +7,7 @@ use push_task::{Action, Observation, PushModel};
 /// Values of a step in files for training: action (−1 for none), tool (3, m), force without that of an arm at rest (6), pose (7).
 pub const STEP_VALUES: usize = 17;
 /// Length of an input row.
-pub const INPUTS: usize = ACTION_COUNT + 33;
+pub(super) const INPUTS: usize = ACTION_COUNT + 33;
 /// Largest input.
 const LIMIT: f64 = 20.0;
 
