@@ -11,7 +11,7 @@ use crate::resample_move::{Hypothesis, normal, replay};
 use crate::{Error, Particles};
 
 /// Draws from a teacher until one is possible.
-const ATTEMPTS: usize = 100;
+pub(crate) const ATTEMPTS: usize = 100;
 /// Bisections of an exponent.
 const BISECTIONS: usize = 40;
 
@@ -244,7 +244,7 @@ impl<S: Clone + Send + Sync, T: Teacher> BridgeFilter<S, T> {
 }
 
 /// The largest exponent in [0, 1] at which the effective size is at least `least`; 0 where there is none.
-fn largest_power(least: f64, size: impl Fn(f64) -> f64) -> f64 {
+pub(crate) fn largest_power(least: f64, size: impl Fn(f64) -> f64) -> f64 {
     if size(1.0) >= least {
         return 1.0;
     }

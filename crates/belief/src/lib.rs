@@ -23,6 +23,8 @@
 //! | resample–move: every move accepted | the same |
 //! | resample–move: moves along differences without their prior | the same |
 //! | resample–move: only the last step's likelihood counts | the same |
+//! | reference: draws from the teacher accepted without their ratio | `a_wrong_teacher_leads_to_the_exact_posterior` |
+//! | reference: weights without the teacher's ratio; evidence not averaged; a teacher's density not mixed with the prior's | the same |
 //! | log-sum-exp without the maximum | `logarithms_far_from_zero_are_summed` |
 
 mod bridge;
@@ -31,6 +33,7 @@ mod diagnostics;
 mod error;
 mod parallel;
 mod particles;
+mod reference;
 mod reinvigorate;
 mod rejection;
 mod resample_move;
@@ -40,5 +43,6 @@ pub use config::RejectionConfig;
 pub use diagnostics::effective_sample_size;
 pub use error::Error;
 pub use particles::Particles;
+pub use reference::{Reference, ReferenceConfig, reference};
 pub use rejection::RejectionFilter;
 pub use resample_move::{ResampleMoveConfig, ResampleMoveFilter};

@@ -7,4 +7,6 @@ mod moves;
 
 pub use config::ResampleMoveConfig;
 pub use filter::ResampleMoveFilter;
-pub(crate) use hypothesis::{Hypothesis, normal, replay};
+pub(crate) use filter::systematic;
+pub(crate) use hypothesis::{Hypothesis, draw, normal, replay};
+pub(crate) use moves::{Proposal, propose};

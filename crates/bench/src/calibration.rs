@@ -5,6 +5,7 @@
 
 mod episode;
 mod figures;
+mod reference;
 mod summary;
 mod table;
 
@@ -30,7 +31,7 @@ const WORLD_LIMIT: Duration = Duration::from_secs(60);
 /// What is missing in an answer.
 const NO_DRAWN: &str = "expected `drawn` in its answer to `reset` (docs/src/reference/world-protocol.md)";
 /// Keys of `task.json` that have to be those of the task.
-const OF_TASK: [&str; 4] = ["scenario", "seed", "network", "world"];
+const OF_TASK: [&str; 5] = ["scenario", "seed", "network", "world", "reference"];
 /// Most bytes of a world's file.
 const MOST_BYTES: u64 = 1 << 24;
 
@@ -47,6 +48,8 @@ pub struct Task {
     pub prior: Option<PathBuf>,
     /// World to play in; the simulated one where `None`. It has to say what it has drawn.
     pub world: Option<WorldAddress>,
+    /// Particles of the exact posterior after the last action; not asked for where `None`.
+    pub reference: Option<usize>,
 }
 
 /// An external world.
@@ -96,7 +99,7 @@ fn timeouts() -> Timeouts {
 ///
 /// A scenario or network that does not load, a world that contradicts it, and a folder of another task.
 pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> Result<Value> {
-    let Task { from, worlds, quick, prior, world } = task;
+    let Task { from, worlds, quick, prior, world, reference } = task;
     let selection = Selection { quick: *quick, ..from.selection(root, PRESET) };
     let scenario = selection.load()?;
     let problem = Problem::assemble(&scenario, root)?;
@@ -108,6 +111,9 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     let external = world.as_ref().map(|address| External::new(address, &problem, from.seed)).transpose()?;
     if let Some(external) = &external {
         identity["world"] = external.name();
+    }
+    if let Some(particles) = reference {
+        identity["reference"] = json!(particles);
     }
     let own = out.join("task.json");
     let mut commit = json!(scenario::commit(root));
@@ -139,7 +145,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
             return serde_json::from_slice(&whole_file::read(&path, MOST_BYTES)?)
                 .with_context(|| format!("{} is no world of this benchmark: move it away", path.display()));
         }
-        let world = episode::play(&problem, &network, from.seed, number, external.as_ref())
+        let world = episode::play(&problem, &network, from.seed, number, external.as_ref(), *reference)
             .with_context(|| format!("world {number}"))?;
         // What failed is tried again by the next call.
         if let Some(failure) = &world.failure {

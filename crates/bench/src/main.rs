@@ -58,6 +58,10 @@ enum What {
         /// docs/src/reference/world-protocol.md.
         #[arg(long, value_name = "COMMAND|ADDRESS")]
         world: Option<WorldAddress>,
+        /// Also samples the exact posterior after the last action, twice, with so many particles, and asks what is known of the obstacle where all
+        /// else is known. Takes minutes a world.
+        #[arg(long, value_name = "PARTICLES", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
+        reference: Option<u32>,
         /// Folder of the results. Worlds that it has are not played again.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -203,9 +207,11 @@ fn run(arguments: &Arguments) -> Result<()> {
                 program::show(&table(&result));
             }
         }
-        What::Calibration { from, worlds, quick, prior, world, out } => {
+        What::Calibration { from, worlds, quick, prior, world, reference, out } => {
             let (prior, world) = (prior.clone(), world.clone());
-            let task = calibration::Task { from: from.clone(), worlds: *worlds, quick: *quick, prior, world };
+            let reference = reference.map(|particles| particles as usize);
+            let task =
+                calibration::Task { from: from.clone(), worlds: *worlds, quick: *quick, prior, world, reference };
             let summary = calibration::run(&root, &task, out, |text| program::say!("{text}"))?;
             program::show(&calibration::table(&summary));
         }

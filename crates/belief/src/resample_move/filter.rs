@@ -155,27 +155,38 @@ impl<S: Clone + Send + Sync> ResampleMoveFilter<S> {
         self.log_weights.iter_mut().for_each(|w| *w -= total);
     }
 
-    /// Systematic resampling, sorted by classes so that each structure gets its share to within one particle.
     fn resample(&mut self, rng: &mut Rng) {
         let count = self.hypotheses.len();
-        let mut order: Vec<usize> = (0..count).collect();
-        order.sort_by(|&a, &b| self.hypotheses[a].classes.cmp(&self.hypotheses[b].classes));
-        let offset: f64 = rng.random();
-        let mut chosen = Vec::with_capacity(count);
-        let mut total = 0.0;
-        for &index in &order {
-            total += self.log_weights[index].exp() * count as f64;
-            while (chosen.len() as f64) + offset < total && chosen.len() < count {
-                chosen.push(self.hypotheses[index].clone());
-            }
-        }
-        // Rounding may leave one place.
-        while chosen.len() < count {
-            chosen.push(chosen[chosen.len() - 1].clone());
-        }
-        self.hypotheses = chosen;
+        let chosen = systematic(&self.log_weights, count, |index| &self.hypotheses[index].classes, rng);
+        self.hypotheses = chosen.into_iter().map(|index| self.hypotheses[index].clone()).collect();
         self.log_weights = vec![-(count as f64).ln(); count];
     }
+}
+
+/// Systematic resampling of `count` from weights that sum to 1, sorted by classes so that each structure gets its share to within one particle.
+/// Returns indices.
+pub(crate) fn systematic<'a>(
+    log_weights: &[f64],
+    count: usize,
+    classes: impl Fn(usize) -> &'a Vec<usize>,
+    rng: &mut Rng,
+) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..log_weights.len()).collect();
+    order.sort_by(|&a, &b| classes(a).cmp(classes(b)));
+    let offset: f64 = rng.random();
+    let mut chosen = Vec::with_capacity(count);
+    let mut total = 0.0;
+    for &index in &order {
+        total += log_weights[index].exp() * count as f64;
+        while (chosen.len() as f64) + offset < total && chosen.len() < count {
+            chosen.push(index);
+        }
+    }
+    // Rounding may leave one place.
+    while chosen.len() < count {
+        chosen.push(chosen[chosen.len() - 1]);
+    }
+    chosen
 }
 
 /// The largest power up to `most` at which the effective size is at least `least`.

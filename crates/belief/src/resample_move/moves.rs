@@ -17,12 +17,12 @@ const JITTER: f64 = 0.02;
 const STEPS: [f64; 4] = [0.1, 0.3, 0.6, 1.0];
 
 /// What a proposal changes.
-struct Proposal {
-    classes: Vec<usize>,
-    start: Vec<f64>,
-    noise: Vec<f64>,
+pub(crate) struct Proposal {
+    pub(crate) classes: Vec<usize>,
+    pub(crate) start: Vec<f64>,
+    pub(crate) noise: Vec<f64>,
     /// ln of prior × reverse proposal over prior × proposal.
-    log_ratio: f64,
+    pub(crate) log_ratio: f64,
 }
 
 /// What one move came to.
@@ -40,8 +40,23 @@ pub(crate) fn attempt<R: Replay>(
     exponent: f64,
     rng: &mut Rng,
 ) -> Moved<R::State> {
+    let Some(Proposal { classes, start, noise, log_ratio }) = propose(episode, current, others, rng) else {
+        return Moved { hypothesis: None, transitions: 0 };
+    };
+    let least = current.log_likelihood(exponent) + rng.random::<f64>().ln() - log_ratio;
+    let Replayed { hypothesis, transitions } = replay(episode, (classes, start, noise), exponent, least);
+    Moved { hypothesis, transitions }
+}
+
+/// A change of `current`; `None` where this kind of change is impossible.
+pub(crate) fn propose<R: Replay>(
+    episode: &R,
+    current: &Hypothesis<R::State>,
+    others: &[Hypothesis<R::State>],
+    rng: &mut Rng,
+) -> Option<Proposal> {
     let kind: f64 = rng.random();
-    let proposal = if kind < DIFFERENCE {
+    if kind < DIFFERENCE {
         difference(current, others, rng)
     } else if kind < DIFFERENCE + BLOCK {
         block(episode, current, rng)
@@ -49,13 +64,7 @@ pub(crate) fn attempt<R: Replay>(
         redraw(episode, current, rng)
     } else {
         refresh(current, rng)
-    };
-    let Some(Proposal { classes, start, noise, log_ratio }) = proposal else {
-        return Moved { hypothesis: None, transitions: 0 };
-    };
-    let least = current.log_likelihood(exponent) + rng.random::<f64>().ln() - log_ratio;
-    let Replayed { hypothesis, transitions } = replay(episode, (classes, start, noise), exponent, least);
-    Moved { hypothesis, transitions }
+    }
 }
 
 /// Differential evolution (ter Braak 2006): along the difference of two others of the same classes.

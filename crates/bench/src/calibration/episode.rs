@@ -13,6 +13,7 @@ use rand::RngExt as _;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
+use super::reference::{Ruler, ruler};
 use super::{External, NO_DRAWN};
 
 /// Draws from prior and network at each step.
@@ -79,6 +80,9 @@ pub struct World {
     pub exponents: Vec<f64>,
     /// Wall-clock time of search and update, mean over the actions, s.
     pub seconds: f64,
+    /// What the ruler says after the last action, where it was asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ruler: Option<Ruler>,
 }
 
 /// Looks on and keeps what later replays need.
@@ -148,30 +152,32 @@ pub(super) fn play(
     root: u64,
     number: u32,
     external: Option<&External>,
+    reference: Option<usize>,
 ) -> Result<World> {
     let seed = seed(root, number);
     let Some(external) = external else {
         let start = problem.sample_world(&mut seed.stream(Purpose::World, 0))?;
         let world = SimulatedWorld::new(&problem.truth, start, seed.stream(Purpose::Truth, 0));
-        return played(problem, network, seed, Opened::new(world, Acted::truth), true);
+        return played(problem, network, seed, Opened::new(world, Acted::truth), true, reference);
     };
     let mut world = external.start(problem)?;
     let episode = world.episode(problem, number, seed.0);
     let stays = problem.scenario.world.obstacle_mobility == ObstacleMobility::Fixed;
-    played(problem, network, seed, Opened::new(episode, ExternalEpisode::drawn), stays)
+    played(problem, network, seed, Opened::new(episode, ExternalEpisode::drawn), stays, reference)
 }
 
 fn failed(failure: String) -> World {
     World { reason: Reason::WorldFailed.name().into(), failure: Some(failure), ..World::default() }
 }
 
-/// `follows`: the truth says where the obstacle is, not only where it was at first.
+/// `follows`: the truth says where the obstacle is, not only where it was at first. `reference`: particles of the ruler.
 fn played<W: Acted>(
     problem: &Problem,
     network: &Network,
     seed: Seed,
     mut world: Opened<W>,
     follows: bool,
+    reference: Option<usize>,
 ) -> Result<World> {
     let mut onlooker = Onlooker {
         truth: None,
@@ -202,7 +208,7 @@ fn played<W: Acted>(
     let mut network = network.clone();
     network.reset();
     network.observe(&problem.model, None, &observation, &joints_rad);
-    let history = agent::history(problem, Some(&network), &observation);
+    let mut history = agent::history(problem, Some(&network), &observation);
     let prior = Estimate::prior(&history);
     let mut draws = |estimate: &Estimate<'_>| -> Result<Row> {
         let drawn = (0..10 * DRAWS).filter_map(|_| {
@@ -221,6 +227,10 @@ fn played<W: Acted>(
         of_prior.push(draws(&prior)?);
         of_network.push(draws(&Estimate::network(&history, &network))?);
     }
+    onlooker.steps.iter().for_each(|(action, observation, joints)| history.push(*action, observation, joints));
+    let ruler = reference
+        .map(|particles| ruler(particles, &history, &Estimate::network(&history, &network), &start, &mut rng))
+        .transpose()?;
     let touched =
         |row: &agent::StepRecord| row.large_force || row.obstacle_touched || moved(&row.observation, &observation);
     Ok(World {
@@ -235,6 +245,7 @@ fn played<W: Acted>(
         transitions: onlooker.transitions,
         exponents: onlooker.exponents,
         seconds,
+        ruler,
     })
 }
 
@@ -261,7 +272,7 @@ fn has(truth: &Particle, index: usize) -> bool {
     }
 }
 
-fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng) -> Row {
+pub(super) fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng) -> Row {
     let weighted: Vec<(&Particle, f64)> = belief.iter().filter(|(_, weight)| *weight > 0.0).collect();
     let mean = |value: &dyn Fn(&Particle) -> f64| weighted.iter().map(|(p, w)| w * value(p)).sum::<f64>();
     let share = |holds: &dyn Fn(&Particle) -> bool| mean(&|p| f64::from(u8::from(holds(p))));

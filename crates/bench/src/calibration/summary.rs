@@ -5,6 +5,7 @@ use rand::RngExt as _;
 use serde_json::{Map, Value, json};
 
 use super::episode::{NUMBERS, Row, World};
+use super::reference::Ruler;
 
 /// Steps that are reported; a world that has ended counts with its last belief.
 pub(super) const STEPS: [usize; 5] = [0, 2, 5, 8, usize::MAX];
@@ -62,7 +63,7 @@ pub(super) fn summary(worlds: &[World], provenance: &Value) -> Value {
             w.filter.iter().enumerate().filter_map(better).collect::<Vec<_>>()
         })
         .collect();
-    json!({
+    let mut summary = json!({
         "provenance": provenance,
         "steps": steps,
         "reliability": reliability(worlds),
@@ -74,7 +75,40 @@ pub(super) fn summary(worlds: &[World], provenance: &Value) -> Value {
         "transitions_per_update": per_update(&worlds.iter().flat_map(|w| w.transitions.iter().map(|t| *t as f64)).collect::<Vec<_>>()),
         "exponent": per_update(&worlds.iter().flat_map(|w| w.exponents.clone()).collect::<Vec<_>>()),
         "seconds_per_action": per_update(&worlds.iter().map(|w| w.seconds).collect::<Vec<_>>()),
-    })
+    });
+    let ruled: Vec<(&World, &Ruler)> = worlds.iter().filter_map(|w| Some((w, w.ruler.as_ref()?))).collect();
+    if !ruled.is_empty() {
+        let agreed: Vec<(&World, &Ruler)> = ruled.iter().copied().filter(|(_, ruler)| ruler.agrees()).collect();
+        summary["reference"] = json!({
+            "all": beside(&ruled, &mut rng),
+            "chains_agree": beside(&agreed, &mut rng),
+            "transitions_per_chain": per_update(
+                &ruled.iter().flat_map(|(_, r)| r.chains.iter().map(|c| c.transitions as f64)).collect::<Vec<_>>()
+            ),
+        });
+    }
+    summary
+}
+
+/// Figures after the last action of worlds that have a ruler, of every source and of the ruler.
+fn beside(ruled: &[(&World, &Ruler)], rng: &mut Rng) -> Value {
+    let mut sources = Map::new();
+    let names = SOURCES.iter().map(|(name, _)| *name).chain(["reference"]);
+    for (index, name) in names.enumerate() {
+        let last = |w: &World, ruler: &Ruler| match SOURCES.get(index) {
+            Some((_, rows)) => rows(w).last().cloned(),
+            None => Some(ruler.row.clone()),
+        };
+        let mut figures = Map::new();
+        for (figure, value) in figures_of_a_row() {
+            let values: Vec<f64> = ruled.iter().filter_map(|(w, r)| value(w, &last(w, r)?)).collect();
+            figures.insert(figure, interval(&values, rng));
+        }
+        sources.insert(name.into(), Value::Object(figures));
+    }
+    let told = |w: &World, ruler: &Ruler| (ruler.told - f64::from(u8::from(w.has_obstacle))).powi(2);
+    let told: Vec<f64> = ruled.iter().map(|(w, r)| told(w, r)).collect();
+    json!({ "worlds": ruled.len(), "sources": sources, "told_obstacle_brier": interval(&told, rng) })
 }
 
 fn at(rows: &[Row], step: usize) -> Option<&Row> {
