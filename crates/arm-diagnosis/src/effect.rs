@@ -146,7 +146,7 @@ effects! {
             "presliding": "load a joint that stands: with presliding the motor turns a little, and an elastic gear gives where the motor does not see it",
             "torque_delay": "compare joints: a delay is the same in all, an elastic gear is not"];
     joint "backlash" "gear with play, with the angle read on the motor's side"
-        ["play" "rad"]
+        ["play" "rad", "stiffness" "N m/rad"]
         shows "A load that changes its sign, angles read at the motor"
         like ["joint_elasticity": "keep the load on one side: play then stays closed, an elastic gear still gives",
             "presliding": "reverse under a load of one sign: play stays closed, presliding shows"];

@@ -5,6 +5,7 @@
 use rayon::prelude::*;
 
 use crate::effect::{EFFECTS, Effect};
+use crate::gear::{Gear, Lag, lag};
 use crate::prepared::{Prepared, mean};
 
 /// A column: torques of one joint, a value a window, or of all joints, joint after joint.
@@ -41,6 +42,12 @@ pub(crate) struct Catalogue {
     pub(crate) masses: Vec<usize>,
     pub(crate) candidates: Vec<Candidate>,
 }
+
+/// Settings of what gears give under a joint's typical torque, with and without play, and of play, rad; prior spread of a size as a multiple of its setting.
+const GIVES_RAD: [f64; 4] = [0.003, 0.007, 0.015, 0.03];
+const TEETH_GIVE_RAD: [f64; 3] = [0.0002, 0.0007, 0.002];
+const PLAYS_RAD: [f64; 5] = [0.0015, 0.003, 0.006, 0.012, 0.024];
+const SPREAD: f64 = 1.5;
 
 /// Spreads of what a nominal model is wrong about although nothing is missing.
 mod nuisance {
@@ -226,7 +233,7 @@ impl Catalogue {
 
     fn add_gear(&mut self, prepared: &Prepared, joint: usize) {
         let own = Some(joint);
-        let (motion, scale) = (&prepared.motion[joint], prepared.scale[joint]);
+        let motion = &prepared.motion[joint];
         let count = prepared.ticks.count();
         let offset = self.push(None, turned(prepared, joint, &vec![1.0; count], None), 0.05, false);
         self.candidate("encoder_offset", own, 0.0, vec![offset]);
@@ -240,16 +247,26 @@ impl Catalogue {
             self.push(None, turned(prepared, joint, &wave, Some(&second.collect::<Vec<_>>())), 0.03, false)
         });
         self.candidate("encoder_eccentricity", own, 0.0, waves.to_vec());
-        // What the gear passes on to the link.
-        let passed = &prepared.rigid[joint];
-        let second = second_derivative(prepared, passed);
-        let place = self.push(None, turned(prepared, joint, passed, Some(&second)), 0.02 / scale, true);
-        self.candidate("joint_elasticity", own, 0.0, vec![place]);
-        for share in [0.03, 0.1] {
-            let side: Vec<f64> = passed.iter().map(|torque| 0.5 * (torque / (share * scale)).tanh()).collect();
-            let second = second_derivative(prepared, &side);
-            let place = self.push(None, turned(prepared, joint, &side, Some(&second)), 0.01, true);
-            self.candidate("backlash", own, share, vec![place]);
+        self.add_held(prepared, joint);
+    }
+
+    /// What holds the link: the coefficient of a column is the size itself, and its motion is that of the setting.
+    fn add_held(&mut self, prepared: &Prepared, joint: usize) {
+        let scale = prepared.scale[joint];
+        let mut held = |name: &str, shape: (f64, f64), size: f64, gear: Gear| {
+            let Lag { angle, second } = lag(prepared, joint, gear);
+            let column = turned(prepared, joint, &angle, Some(&second));
+            let per_size = column.iter().map(|value| value / size).collect();
+            let place = self.push(None, per_size, SPREAD * size, true);
+            self.shaped(name, Some(joint), shape, vec![place]);
+        };
+        for give in GIVES_RAD {
+            held("joint_elasticity", (scale / give, 0.0), give / scale, Gear { stiffness: scale / give, play: 0.0 });
+        }
+        for give in TEETH_GIVE_RAD {
+            for play in PLAYS_RAD {
+                held("backlash", (scale / give, play), play, Gear { stiffness: scale / give, play });
+            }
         }
     }
 
@@ -413,11 +430,6 @@ fn tilted(prepared: &Prepared) -> [Vec<f64>; 2] {
         }
         column
     })
-}
-
-/// Second derivative in time of a series, over about 0.08 s.
-fn second_derivative(prepared: &Prepared, series: &[f64]) -> Vec<f64> {
-    around(prepared, series, |[before, now, after], step| (after - 2.0 * now + before) / (step * step))
 }
 
 /// A function of a series some time before each tick, at it and after, and of that time, s; 0 at the ends of episodes.

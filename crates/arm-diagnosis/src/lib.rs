@@ -11,6 +11,7 @@ mod error;
 mod features;
 mod fit;
 mod friction;
+mod gear;
 mod group;
 mod header;
 mod kinds;
