@@ -105,7 +105,7 @@ fn verbs_of(verb: &str) -> &'static [&'static str] {
         }
         "import-log" => &["table", "mcap", "ros2", "lerobot", "contactnets", "cmu-push"],
         "log" => &["check", "align"],
-        "robot" => &["check"],
+        "robot" => &["check", "excite"],
         "scenario" => &["check", "schema"],
         _ => &[],
     }

@@ -23,7 +23,7 @@ fn package(binary: &str) -> &str {
         "record-log" | "diagnose-learn" | "arm-learn" => "diagnose-benchmark",
         "diagnose" | "log" => "discrepancy",
         "docs" => "book",
-        "robot" => "arm-dynamics",
+        "robot" => "arm-excitation",
         // Called like their packages.
         other => other,
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Isometry3, IsometryMatrix3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, IsometryMatrix3, Point3, Translation3, UnitQuaternion};
 use thiserror::Error;
 use urdf_file::{Joint, JointKind, Urdf, UrdfError, joint_error, link_error};
 
@@ -174,6 +174,24 @@ impl Arm {
         let pose = links.fold(IsometryMatrix3::identity(), |base, link| base * link) * self.last_from_tip;
         let turn = UnitQuaternion::from_rotation_matrix(&pose.rotation);
         Isometry3::from_parts(Translation3::from(pose.translation.vector), turn)
+    }
+
+    /// Places of the base, of each joint and of the tip in the base frame, m, at `q` (rad).
+    ///
+    /// # Panics
+    ///
+    /// If `q` has not one value for each joint.
+    #[must_use]
+    pub fn origins(&self, q: &[f64]) -> Vec<Point3<f64>> {
+        assert_eq!(q.len(), self.joints.len(), "positions of the joints");
+        let mut places = vec![Point3::origin()];
+        let mut base = IsometryMatrix3::identity();
+        for (segment, position) in self.segments.iter().zip(q) {
+            base *= segment.parent_from_link(*position);
+            places.push(base.translation.vector.into());
+        }
+        places.push((base * self.last_from_tip).translation.vector.into());
+        places
     }
 
     /// The same arm with other masses, one for each joint, in its frame.

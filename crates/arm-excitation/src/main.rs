@@ -1,4 +1,6 @@
-//! `cargo xtask robot`: what a file says about an arm.
+//! `cargo xtask robot`: what a file says about an arm, and which motion shows most of it.
+
+mod excite;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -8,7 +10,7 @@ use arm_dynamics::{Arm, GRAVITY, Selection};
 use clap::{Parser, Subcommand};
 use serde::Serialize;
 
-/// Shows what a file says about an arm, and what looks wrong in it.
+/// Shows what a file says about an arm, and writes a motion that shows what the file may lack.
 #[derive(Debug, Parser)]
 #[command(name = "robot", version, after_help = EXAMPLES)]
 struct Arguments {
@@ -36,6 +38,9 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
+    /// Writes a motion, within the limits, whose log would tell most of what the file may lack.
+    #[command(after_help = EXCITE_EXAMPLES)]
+    Excite(excite::Excite),
 }
 
 /// Largest position that `--at` takes, rad or m: more was not meant.
@@ -45,6 +50,10 @@ const EXAMPLES: &str = "\
 Examples:
   cargo xtask robot check scenarios/robots/sawyer.toml
   cargo xtask robot check tests/data/joint-log/arm.urdf --tip flange --at 0,-0.5,0,-1,0,1,0.8,0";
+
+const EXCITE_EXAMPLES: &str = "\
+Examples:
+  cargo xtask robot excite tests/data/joint-log/arm.urdf --tell friction --tries 200 --out runs/excitation.csv";
 
 /// What `check` prints.
 #[derive(Debug, Serialize)]
@@ -81,7 +90,10 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
-    let Verb::Check { file, joints, tip, at, json } = &arguments.verb;
+    let (file, joints, tip, at, json) = match &arguments.verb {
+        Verb::Check { file, joints, tip, at, json } => (file, joints, tip, at, json),
+        Verb::Excite(asked) => return excite::run(asked),
+    };
     let arm = Arm::open(file, &Selection { joints: joints.clone(), tip: tip.clone() })?;
     let check = check(&arm, file, at.as_deref())?;
     if *json {

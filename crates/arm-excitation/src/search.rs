@@ -1,0 +1,221 @@
+//! The motion that tells most.
+
+use arm_dynamics::{Arm, GRAVITY};
+use basin::{CmaEs, CostFunction, DenseMatrix, Executor, PopulationProgress};
+use pomdp::{Purpose, Rng, Seed};
+use rand::RngExt as _;
+use rand_distr::{Distribution as _, StandardNormal};
+
+use crate::Error;
+use crate::information::{Question, Spread, Unknowns};
+use crate::motion::{Motion, NUMBERS, Room, Sample};
+use crate::room::Rods;
+
+/// Times at which collisions and torques are looked at.
+const GRID: usize = 100;
+/// Random series that the best start is taken of, and that the result is compared with.
+const STARTS: usize = 64;
+/// How much smaller random series are at most: by a factor of about exp of that.
+const WIDE: f64 = 6.0;
+/// Share of a joint's strongest torque that a motion may ask for.
+const EFFORT: f64 = 0.8;
+/// Nats that a broken limit costs, per its excess: much more than a log can tell.
+const PRICE: f64 = 1000.0;
+/// Excess that is none: a rod as thick as said has that much to spare.
+const NOTHING: f64 = 1e-4;
+
+/// What is wanted.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// What a log should tell.
+    pub question: Question,
+    /// Length of the motion, s.
+    pub seconds: f64,
+    /// Share of the fastest rate of each joint that is used, above 0 and at most 1.
+    pub speed: f64,
+    /// Radius of the links, m.
+    pub radius_m: f64,
+    /// Height below which nothing may come, m in the base frame; none where there is no floor.
+    pub floor_m: Option<f64>,
+    /// Motions that are tried.
+    pub tries: usize,
+    /// Of all that is drawn.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let (question, seconds, speed) = (Question::All, 20.0, 0.5);
+        Self { question, seconds, speed, radius_m: 0.06, floor_m: Some(0.0), tries: 2000, seed: 1 }
+    }
+}
+
+/// The motion that was found.
+#[derive(Clone, Debug)]
+pub struct Excitation {
+    /// Positions, rates and accelerations.
+    pub motion: Motion,
+    /// Expected information about what was asked, nats.
+    pub nats: f64,
+    /// The same of random series that keep the limits, sorted.
+    pub random_nats: Vec<f64>,
+    /// Random series that were tried.
+    pub random: usize,
+    /// How well each number would be known.
+    pub spreads: Vec<Spread>,
+}
+
+struct Task<'a> {
+    arm: &'a Arm,
+    settings: &'a Settings,
+    rooms: Vec<Room>,
+    rods: Rods,
+    unknowns: Unknowns<'a>,
+}
+
+/// The motion whose log tells most of what `settings` ask. `note` hears of progress: motions tried, of how many, and the most nats so far.
+///
+/// # Errors
+///
+/// [`Error::Setting`] where a setting is outside its limits; [`Error::Limits`] where no motion was found that keeps them.
+pub fn excitation(arm: &Arm, settings: &Settings, note: impl Fn(usize, usize, f64)) -> Result<Excitation, Error> {
+    settings.check()?;
+    let mut rng = Seed(settings.seed).stream(Purpose::Exploration, 0);
+    let task = Task::new(arm, settings, &mut rng);
+    let count = NUMBERS * arm.joints().len();
+    let drawn: Vec<(f64, Vec<f64>)> = (0..STARTS)
+        .map(|_| {
+            let mut numbers: Vec<f64> = (0..count).map(|_| StandardNormal.sample(&mut rng)).collect();
+            // From wide motions to small ones, anywhere: a wide one seldom keeps clear of everything.
+            let wide = WIDE * rng.random::<f64>();
+            for joint in numbers.chunks_mut(NUMBERS) {
+                joint[NUMBERS - 2] -= wide;
+                joint[NUMBERS - 1] *= 2.0;
+            }
+            (task.cost(&numbers), numbers)
+        })
+        .collect();
+    let mut random_nats: Vec<f64> = drawn
+        .iter()
+        .filter(|(_, numbers)| task.excess(&task.motion(numbers)) < NOTHING)
+        .map(|(cost, _)| -cost)
+        .collect();
+    random_nats.sort_by(f64::total_cmp);
+    let first = drawn.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut least, mut best) = first.unwrap_or((f64::INFINITY, vec![0.0; count]));
+    note(STARTS, settings.tries.max(STARTS), -least);
+    let generation = CmaEs::<Vec<f64>, DenseMatrix>::default_lambda(count) as u64;
+    let rest = settings.tries.saturating_sub(STARTS) as u64 / generation;
+    if rest > 0 {
+        let solver = CmaEs::<_, DenseMatrix>::new(settings.seed, 0.3);
+        let found = Executor::new(&task, solver, PopulationProgress::from_point(best.clone())).max_iter(rest).run();
+        let found = found.unwrap_or_else(|never| match never {});
+        if found.best_cost() < least {
+            (least, best) = (found.best_cost(), found.best_param().clone());
+        }
+        note(settings.tries, settings.tries, -least);
+    }
+    let motion = task.motion(&best);
+    if task.excess(&motion) >= NOTHING {
+        return Err(Error::Limits { seconds: settings.seconds, why: task.why(&motion) });
+    }
+    let spreads = task.unknowns.spreads(&motion);
+    Ok(Excitation { nats: task.unknowns.nats(&motion), random_nats, random: STARTS, spreads, motion })
+}
+
+impl Settings {
+    fn check(&self) -> Result<(), Error> {
+        let within = |name: &str, value: f64, low: f64, high: f64| {
+            let inside = (low..=high).contains(&value);
+            inside.then_some(()).ok_or_else(|| Error::Setting(format!("`{name}` is {value}, expected {low} to {high}")))
+        };
+        within("seconds", self.seconds, 1.0, 600.0)?;
+        within("speed", self.speed, 0.01, 1.0)?;
+        within("radius", self.radius_m, 0.0, 1.0)?;
+        within("floor", self.floor_m.unwrap_or(0.0), -10.0, 10.0)?;
+        within("tries", self.tries as f64, 1.0, 1e6)
+    }
+}
+
+impl<'a> Task<'a> {
+    fn new(arm: &'a Arm, settings: &'a Settings, rng: &mut Rng) -> Self {
+        let rooms = Room::of(arm, settings.speed);
+        let posture = |rng: &mut Rng| -> Vec<f64> {
+            rooms.iter().map(|room| room.lower + (room.upper - room.lower).max(0.0) * rng.random::<f64>()).collect()
+        };
+        let postures: Vec<Vec<f64>> = (0..64).map(|_| posture(rng)).collect();
+        let scale = scale(arm, &postures);
+        let rods = Rods::new(arm, settings.radius_m, settings.floor_m, postures.into_iter());
+        let unknowns = Unknowns::new(arm, scale, settings.question);
+        Self { arm, settings, rooms, rods, unknowns }
+    }
+
+    fn motion(&self, numbers: &[f64]) -> Motion {
+        Motion::of(numbers, &self.rooms, self.settings.seconds)
+    }
+
+    /// Torques beyond what motors can, in units of that, and rods that meet, in units of their radius; the mean over the motion.
+    fn excess(&self, motion: &Motion) -> f64 {
+        let (torque, room) = self.excesses(motion);
+        torque + room
+    }
+
+    fn excesses(&self, motion: &Motion) -> (f64, f64) {
+        let (mut torque, mut room) = (0.0, 0.0);
+        for i in 0..GRID {
+            let samples = motion.at((i as f64 + 0.5) * motion.seconds() / GRID as f64);
+            let each = |pick: fn(&Sample) -> f64| samples.iter().map(pick).collect::<Vec<f64>>();
+            let q = each(|sample| sample.position);
+            let torques = self.arm.inverse_dynamics(&q, &each(|s| s.rate), &each(|s| s.acceleration), &GRAVITY);
+            for (joint, torque_nm) in self.arm.joints().iter().zip(&torques) {
+                if joint.effort.is_finite() && joint.effort > 0.0 {
+                    torque += (torque_nm.abs() / joint.effort - EFFORT).max(0.0);
+                }
+            }
+            room += self.rods.overlap(self.arm, &q) / self.settings.radius_m.max(0.01);
+        }
+        (torque / GRID as f64, room / GRID as f64)
+    }
+
+    fn why(&self, motion: &Motion) -> String {
+        let (torque, room) = self.excesses(motion);
+        if torque > room {
+            format!("it asks for more than {:.0} % of a motor's torque", 100.0 * EFFORT)
+        } else {
+            "links meet each other or the floor".into()
+        }
+    }
+
+    fn cost(&self, numbers: &[f64]) -> f64 {
+        let motion = self.motion(numbers);
+        let excess = self.excess(&motion);
+        let price = if excess < NOTHING { 0.0 } else { 1.0 + PRICE * excess };
+        price - self.unknowns.nats(&motion)
+    }
+}
+
+impl CostFunction for &Task<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+    type Error = std::convert::Infallible;
+
+    fn cost(&self, numbers: &Vec<f64>) -> Result<f64, Self::Error> {
+        Ok(Task::cost(self, numbers))
+    }
+}
+
+/// Typical torque of each joint: held still in many postures, and at least a hundredth of the largest.
+fn scale(arm: &Arm, postures: &[Vec<f64>]) -> Vec<f64> {
+    let count = arm.joints().len();
+    let (zero, one) = (vec![0.0; count], vec![1.0; count]);
+    let mut squares = vec![0.0; count];
+    for q in postures {
+        let still = arm.inverse_dynamics(q, &zero, &zero, &GRAVITY);
+        let moved = arm.inverse_dynamics(q, &zero, &one, &nalgebra::Vector3::zeros());
+        for joint in 0..count {
+            squares[joint] += (still[joint].powi(2) + moved[joint].powi(2)) / postures.len() as f64;
+        }
+    }
+    let most = squares.iter().copied().fold(0.0, f64::max).sqrt();
+    squares.into_iter().map(|square| square.sqrt().max(0.01 * most).max(1e-3)).collect()
+}
