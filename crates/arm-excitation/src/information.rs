@@ -90,7 +90,9 @@ impl<'a> Unknowns<'a> {
                 add(Question::Masses, format!("{name} at {}", joint.name), unit, before);
             }
         }
-        for (place, (name, unit)) in MASS.iter().enumerate() {
+        // A payload is all that the last link's masses could be told from: who asks for these carries none.
+        let carried = if question == Question::Masses { &[][..] } else { &MASS[..] };
+        for (place, (name, unit)) in carried.iter().enumerate() {
             let before = 0.1 * total * [1.0, 0.15, 0.01][usize::from(place > 0) + usize::from(place > 3)];
             add(Question::Payload, format!("payload's {name}"), unit, before);
         }
@@ -137,7 +139,9 @@ impl<'a> Unknowns<'a> {
         let state = self.arm.motion(&each(|s| s.position), &each(|s| s.rate), &each(|s| s.acceleration), &GRAVITY);
         let joints = samples.len();
         let mut columns: Vec<PerJoint> = (0..joints).flat_map(|link| state.regressor(link)).collect();
-        columns.extend(state.regressor(joints - 1));
+        if self.question != Question::Masses {
+            columns.extend(state.regressor(joints - 1));
+        }
         let torques = state.torques();
         for (joint, sample) in samples.iter().enumerate() {
             for value in [(sample.rate / TURNS_RPS).tanh(), sample.rate, sample.acceleration, torques[joint], 1.0] {
