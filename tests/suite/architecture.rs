@@ -9,7 +9,7 @@ use serde_json::Value;
 
 /// Packages with programs, but for `book`: mdBook wants another feature of a crate that others use too.
 const WITH_PROGRAMS: [&str; 10] = [
-    "arm-dynamics",
+    "arm-excitation",
     "bench",
     "datagen",
     "diagnose-benchmark",

@@ -61,7 +61,7 @@ Examples:
     /// Records a log in the true world of a scenario, to rehearse a diagnosis.
     #[command(disable_help_flag = true)]
     RecordLog(Rest),
-    /// Shows what a URDF file says about an arm: joints, limits, masses, torques, reach, and what looks wrong.
+    /// Shows what a URDF file says about an arm and what looks wrong, and writes motions that show what it lacks.
     #[command(disable_help_flag = true)]
     Robot(Rest),
     /// Looks at a log before anything is concluded from it: units, frames, sizes, clocks, sensors.

@@ -43,10 +43,13 @@ pub(crate) struct Catalogue {
     pub(crate) candidates: Vec<Candidate>,
 }
 
-/// Settings of what gears give under a joint's typical torque, with and without play, and of play, rad; prior spread of a size as a multiple of its setting.
-const GIVES_RAD: [f64; 4] = [0.003, 0.007, 0.015, 0.03];
-const TEETH_GIVE_RAD: [f64; 3] = [0.0002, 0.0007, 0.002];
-const PLAYS_RAD: [f64; 5] = [0.0015, 0.003, 0.006, 0.012, 0.024];
+/// Settings, three or four a decade: what gears give under a joint's typical torque, rad, with and without play; play, rad; their damping ratios. The prior
+/// spread of a size is a multiple of its setting.
+const GIVES_RAD: [f64; 9] = [0.001, 0.0018, 0.0032, 0.0056, 0.01, 0.018, 0.032, 0.056, 0.1];
+const FLANK_GIVES_RAD: [f64; 3] = [0.0002, 0.001, 0.005];
+const PLAYS_RAD: [f64; 6] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05];
+const GIVE_DAMPING: [f64; 2] = [0.3, 1.0];
+const FLANK_DAMPING: f64 = 0.3;
 const SPREAD: f64 = 1.5;
 
 /// Spreads of what a nominal model is wrong about although nothing is missing.
@@ -261,11 +264,15 @@ impl Catalogue {
             self.shaped(name, Some(joint), shape, vec![place]);
         };
         for give in GIVES_RAD {
-            held("joint_elasticity", (scale / give, 0.0), give / scale, Gear { stiffness: scale / give, play: 0.0 });
+            for damping_ratio in GIVE_DAMPING {
+                let gear = Gear { stiffness: scale / give, play: 0.0, damping_ratio };
+                held("joint_elasticity", (gear.stiffness, damping_ratio), give / scale, gear);
+            }
         }
-        for give in TEETH_GIVE_RAD {
+        for give in FLANK_GIVES_RAD {
             for play in PLAYS_RAD {
-                held("backlash", (scale / give, play), play, Gear { stiffness: scale / give, play });
+                let gear = Gear { stiffness: scale / give, play, damping_ratio: FLANK_DAMPING };
+                held("backlash", (gear.stiffness, play), play, gear);
             }
         }
     }

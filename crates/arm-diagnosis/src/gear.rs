@@ -6,13 +6,11 @@
 
 use crate::prepared::Prepared;
 
-/// Longest step of the integration, s.
+/// Longest step of the integration, s. Steps are implicit, which damps what is quicker; windows of 0.04 s do not show it anyway.
 const STEP_SECS: f64 = 0.001;
-/// Highest frequency of a link on its flanks, rad/s: above it, windows of 0.04 s show nothing and steps cost time.
-const MOST_RPS: f64 = 250.0;
-/// Damping ratios of flanks that meet, and of gears that give.
-const FLANK_DAMPING: f64 = 0.3;
-const SPRING_DAMPING: f64 = 0.06;
+
+/// Time over which the rate of a link is taken that moves when its log begins, s.
+const START_SECS: f64 = 0.1;
 
 /// What holds a link.
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +19,8 @@ pub(crate) struct Gear {
     pub(crate) stiffness: f64,
     /// From flank to flank, rad; 0 where there is none.
     pub(crate) play: f64,
+    /// Share of critical damping.
+    pub(crate) damping_ratio: f64,
 }
 
 /// How far a link is behind its motor, rad, and the second derivative of that, for each tick.
@@ -42,7 +42,14 @@ pub(crate) fn lag(prepared: &Prepared, joint: usize, gear: Gear) -> Lag {
             Link { passed, inertia, slope: prepared.stiffness[joint][joint][tick] / gain }
         };
         let Some(first) = span.clone().next() else { continue };
-        let mut state = gear.rest(&at(first));
+        // A log may begin in the midst of a motion: the gear then gives as it would under a torque that changes slowly.
+        let begun = prepared.ticks.time_secs[first];
+        let soon = |tick: &usize| prepared.ticks.time_secs[*tick] - begun < START_SECS;
+        let later = span.clone().find(|tick| !soon(tick)).unwrap_or(first);
+        let apart = prepared.ticks.time_secs[later] - begun;
+        let (start, then) = (gear.rest(&at(first)), gear.rest(&at(later)));
+        let rate = if apart > 0.0 && start.side == then.side { (then.angle - start.angle) / apart } else { 0.0 };
+        let mut state = Ahead { angle: start.angle, rate };
         for tick in span.clone() {
             let next = tick + 1;
             let secs =
@@ -69,6 +76,12 @@ struct Link {
     slope: f64,
 }
 
+/// Where a link rests, and at which flank: 1 or −1.
+struct Rest {
+    angle: f64,
+    side: f64,
+}
+
 /// Where a link is ahead of its motor, rad, and how fast, rad/s.
 #[derive(Clone, Copy)]
 struct Ahead {
@@ -79,16 +92,14 @@ struct Ahead {
 impl Gear {
     /// Stiffness and damping of the link's motion, and half of the play.
     fn constants(self, inertia: f64) -> (f64, f64, f64) {
-        let stiffness = self.stiffness.min(inertia * MOST_RPS * MOST_RPS);
-        let ratio = if self.play > 0.0 { FLANK_DAMPING } else { SPRING_DAMPING };
-        (stiffness, 2.0 * ratio * (stiffness * inertia).sqrt(), 0.5 * self.play)
+        (self.stiffness, 2.0 * self.damping_ratio * (self.stiffness * inertia).sqrt(), 0.5 * self.play)
     }
 
-    /// Held still under the torque of the first tick.
-    fn rest(self, link: &Link) -> Ahead {
+    /// Held still under the torque of a tick.
+    fn rest(self, link: &Link) -> Rest {
         let (stiffness, _, half) = self.constants(link.inertia);
-        let side = if link.passed > 0.0 { -half } else { half };
-        Ahead { angle: side - link.passed / stiffness, rate: 0.0 }
+        let side = if link.passed > 0.0 { -1.0 } else { 1.0 };
+        Rest { angle: side * half - link.passed / stiffness, side }
     }
 
     /// One step; forces of the flanks are implicit, so that no stiffness is too large for it.
@@ -113,6 +124,10 @@ impl Gear {
 mod tests {
     use super::*;
 
+    fn still(gear: Gear, link: &Link) -> Ahead {
+        Ahead { angle: gear.rest(link).angle, rate: 0.0 }
+    }
+
     fn run(gear: Gear, start: Ahead, passed: impl Fn(f64) -> f64, secs: f64) -> Vec<Ahead> {
         let mut states = vec![start];
         for step in 0..(secs / STEP_SECS) as usize {
@@ -124,26 +139,43 @@ mod tests {
 
     #[test]
     fn a_spring_gives_by_torque_over_stiffness() {
-        let gear = Gear { stiffness: 1000.0, play: 0.0 };
-        let still = gear.rest(&Link { passed: 5.0, inertia: 2.0, slope: 0.0 });
-        assert!((still.angle + 0.005).abs() < 1e-12);
-        let last = *run(gear, still, |_| 5.0, 1.0).last().unwrap();
+        let gear = Gear { stiffness: 1000.0, play: 0.0, damping_ratio: 0.02 };
+        let start = still(gear, &Link { passed: 5.0, inertia: 2.0, slope: 0.0 });
+        assert!((start.angle + 0.005).abs() < 1e-12);
+        let last = *run(gear, start, |_| 5.0, 1.0).last().unwrap();
         assert!((last.angle + 0.005).abs() < 1e-9 && last.rate.abs() < 1e-9);
+    }
+
+    #[test]
+    fn no_gear_is_too_stiff_and_no_link_too_light() {
+        let gear = Gear { stiffness: 1e7, play: 0.001, damping_ratio: 0.5 };
+        let link = Link { passed: 1.0, inertia: 1e-4, slope: 0.0 };
+        let mut state = still(gear, &link);
+        assert!((state.angle + 0.0005 + 1e-7).abs() < 1e-12, "{}", state.angle);
+        for _ in 0..1000 {
+            state = gear.stepped(state, &link, STEP_SECS);
+        }
+        assert!((state.angle + 0.0005 + 1e-7).abs() < 1e-10 && state.rate.abs() < 1e-9);
     }
 
     #[test]
     fn a_spring_swings_at_its_frequency() {
         // √(k/M) = 22.4 rad/s: a period of 0.281 s.
-        let states = run(Gear { stiffness: 1000.0, play: 0.0 }, Ahead { angle: 0.01, rate: 0.0 }, |_| 0.0, 1.2);
+        let states = run(
+            Gear { stiffness: 1000.0, play: 0.0, damping_ratio: 0.02 },
+            Ahead { angle: 0.01, rate: 0.0 },
+            |_| 0.0,
+            1.2,
+        );
         let signs = states.windows(2).filter(|pair| pair[0].angle * pair[1].angle < 0.0).count();
-        assert_eq!(signs, 8, "half periods of 0.14 s in 1.2 s");
+        assert_eq!(signs, 9, "at 0.07 s, then every 0.14 s, in 1.2 s");
     }
 
     #[test]
     fn play_is_crossed_in_free_fall() {
         // At rest on one flank; then the torque reverses: ½ (5/2) t² = 0.01, t = 0.089 s.
-        let gear = Gear { stiffness: 1e6, play: 0.01 };
-        let start = gear.rest(&Link { passed: 5.0, inertia: 2.0, slope: 0.0 });
+        let gear = Gear { stiffness: 1e6, play: 0.01, damping_ratio: 0.5 };
+        let start = still(gear, &Link { passed: 5.0, inertia: 2.0, slope: 0.0 });
         assert!((start.angle + 0.005).abs() < 1e-4);
         let states = run(gear, start, |_| -5.0, 0.5);
         let crossed = states.iter().position(|state| state.angle > 0.005).unwrap() as f64 * STEP_SECS;

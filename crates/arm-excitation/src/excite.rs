@@ -3,13 +3,16 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use anyhow::{Context as _, Result, bail, ensure};
+use anyhow::{Context as _, Result, ensure};
 use arm_dynamics::{Arm, Selection};
 use arm_excitation::{Excitation, Question, Settings, excitation};
 use clap::Args;
 use serde_json::json;
 use whole_file::Existing;
 
+/// Rows a second: a log needs 20.
+const LEAST_HZ: f64 = 20.0;
+const MOST_HZ: f64 = 1e5;
 /// Most rows of a file.
 const MOST_ROWS: f64 = 2e6;
 
@@ -24,7 +27,7 @@ pub(crate) struct Excite {
     /// Link at the end of the last rod [default: the last one of the chain].
     #[arg(long)]
     tip: Option<String>,
-    /// What the log should tell, with all else unknown as well.
+    /// What the log should tell, with what else may be wrong unknown as well; for masses no payload is carried.
     #[arg(long, value_enum, default_value_t = Tell::All)]
     tell: Tell,
     /// Length, s.
@@ -91,12 +94,6 @@ pub(crate) fn run(asked: &Excite) -> Result<()> {
     folder.map_or(Ok(()), whole_file::check_folder)?;
     let arm = Arm::open(&asked.file, &selection)?;
     ensure!(!asked.out.exists(), "{} is there already: choose another name", asked.out.display());
-    let rows = asked.rate * asked.seconds;
-    ensure!(
-        asked.rate > 0.0 && rows.is_finite() && (1.0..=MOST_ROWS).contains(&rows),
-        "--rate: expected more than 0 and at most {MOST_ROWS:.0} rows in all, found {}",
-        asked.rate
-    );
     let settings = Settings {
         question: asked.tell.into(),
         seconds: asked.seconds,
@@ -106,13 +103,17 @@ pub(crate) fn run(asked: &Excite) -> Result<()> {
         tries: asked.tries,
         seed: asked.seed,
     };
-    for joint in arm.joints() {
-        if joint.lower.partial_cmp(&joint.upper) != Some(std::cmp::Ordering::Less) {
-            bail!("joint {:?} has no room between its limits in {}", joint.name, asked.file.display());
-        }
-    }
-    let found =
-        excitation(&arm, &settings, |tried, of, nats| program::say!("{tried} of {of} motions, {nats:.1} nats"))?;
+    settings.check()?;
+    let rows = asked.rate * asked.seconds;
+    ensure!(
+        (LEAST_HZ..=MOST_HZ).contains(&asked.rate) && rows <= MOST_ROWS,
+        "--rate is {}, expected {LEAST_HZ} to {MOST_HZ} rows a second and at most {MOST_ROWS} in all",
+        asked.rate
+    );
+    let found = excitation(&arm, &settings, |tried, of, nats| match nats {
+        Some(nats) => program::say!("{tried} of {of} motions, {nats:.1} nats"),
+        None => program::say!("{tried} of {of} motions, none keeps the limits yet"),
+    })?;
     let text = table(&arm, &found, asked.rate);
     folder
         .map_or(Ok(()), std::fs::create_dir_all)
@@ -120,15 +121,15 @@ pub(crate) fn run(asked: &Excite) -> Result<()> {
     let written = whole_file::write(&asked.out, text.as_bytes(), Existing::Keep)?;
     ensure!(written, "{} is there already: choose another name", asked.out.display());
     if asked.json {
-        let middle = found.random_nats.get(found.random_nats.len() / 2);
+        let middle = found.random_median();
         let summary = json!({
             "question": settings.question, "nats": found.nats, "random_nats_median": middle,
             "random_motions": found.random, "random_motions_that_keep_the_limits": found.random_nats.len(),
-            "spreads": found.spreads,
+            "spreads": found.spreads, "notes": found.notes.iter().chain(arm.notes()).collect::<Vec<_>>(),
         });
         program::show(&(serde_json::to_string_pretty(&summary).context("JSON")? + "\n"));
     } else {
-        print(&found);
+        print(&found, arm.notes());
     }
     program::say!("written to {}", asked.out.display());
     Ok(())
@@ -143,9 +144,10 @@ fn table(arm: &Arm, found: &Excitation, rate: f64) -> String {
         }
     }
     text.push('\n');
-    let rows = (rate * found.motion.seconds()).floor() as usize;
-    for row in 0..=rows {
-        let time = row as f64 / rate;
+    let seconds = found.motion.seconds();
+    // The end, where the arm rests, is a row too.
+    let rows = (rate * seconds - 1e-6).ceil() as usize;
+    for time in (0..rows).map(|row| row as f64 / rate).chain([seconds]) {
         let samples = found.motion.at(time);
         let _ = write!(text, "{time:.6}");
         for value in samples
@@ -161,24 +163,35 @@ fn table(arm: &Arm, found: &Excitation, rate: f64) -> String {
     text
 }
 
-fn print(found: &Excitation) {
-    program::out!("{:<44} {:>12} {:>12}  unit", "number", "before", "after");
+/// Three digits that say something.
+fn digits(value: f64) -> String {
+    let places = if value > 0.0 { (2 - value.log10().floor() as i32).clamp(0, 12) } else { 0 };
+    format!("{value:.*}", places as usize)
+}
+
+fn print(found: &Excitation, of_file: &[String]) {
+    program::out!("{:<60} {:>12} {:>12}  unit", "number", "before", "after");
     for spread in &found.spreads {
-        let name = whole_file::one_line(&spread.name, 44);
-        program::out!("{name:<44} {:>12.4} {:>12.4}  {}", spread.before, spread.after, spread.unit);
+        let name = whole_file::one_line(&spread.name, 60);
+        program::out!("{name:<60} {:>12} {:>12}  {}", digits(spread.before), digits(spread.after), spread.unit);
     }
     program::out!(
         "Standard deviations before the log and after it, where torques are off by 2 % of what is typical, anew every 0.1 s."
     );
-    let compared = match found.random_nats.get(found.random_nats.len() / 2) {
+    let compared = match found.random_median() {
         Some(middle) => format!(
-            "{:.1} in the middle of {} random motions that keep the limits, of {}",
-            middle,
-            found.random_nats.len(),
-            found.random
+            "of {} random motions, wide and small, {} keep the limits and tell {middle:.1} in the middle",
+            found.random,
+            found.random_nats.len()
         ),
         None => format!("none of {} random motions keeps the limits", found.random),
     };
     program::out!("The log is expected to tell {:.1} nats; {compared}.", found.nats);
-    program::out!("Links were taken for rods from joint to joint: look at the motion in a simulator first.");
+    for note in found.notes.iter().chain(of_file) {
+        program::out!("  {note}");
+    }
+    program::out!("Masses stand in the frames of their joints, whose z is the axis.");
+    program::out!(
+        "Links were taken for rods from joint to joint, the first from the file's root: look at the motion in a simulator first."
+    );
 }

@@ -9,8 +9,10 @@ use crate::motion::Motion;
 const READINGS: f64 = 10.0;
 /// Standard deviation of a reading's torque, as a share of the joint's typical torque.
 const NOISE: f64 = 0.02;
-/// Rate at which Coulomb friction has turned to the other sign, rad/s.
-const TURNS_RPS: f64 = 0.01;
+/// Share of a joint's fastest rate at which Coulomb friction has turned to the other sign.
+const TURNS: f64 = 0.01;
+/// Shortest length that a link is taken for, m.
+const SHORTEST_M: f64 = 1e-4;
 
 /// What a log should tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -41,7 +43,7 @@ pub struct Spread {
     pub unit: &'static str,
     /// Standard deviation before the log is seen.
     pub before: f64,
-    /// And after, with all other numbers unknown as well.
+    /// And after, with all other numbers unknown as well: those of a payload too, but where the links' masses are asked for.
     pub after: f64,
 }
 
@@ -57,56 +59,70 @@ struct Number {
 pub(crate) struct Unknowns<'a> {
     arm: &'a Arm,
     numbers: Vec<Number>,
-    /// Typical torque of each joint, N·m.
-    scale: Vec<f64>,
+    usual: Vec<Usual>,
     question: Question,
 }
 
+/// What is usual in a joint, SI.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Usual {
+    pub(crate) torque: f64,
+    /// Of all that it carries, about its axis.
+    pub(crate) inertia: f64,
+    /// Its fastest.
+    pub(crate) rate: f64,
+    /// From it to the next joint or to the centre of its link, whatever is longer.
+    pub(crate) length_m: f64,
+}
+
 impl<'a> Unknowns<'a> {
-    /// `scale` is each joint's typical torque.
-    pub(crate) fn new(arm: &'a Arm, scale: Vec<f64>, question: Question) -> Self {
+    pub(crate) fn new(arm: &'a Arm, usual: Vec<Usual>, question: Question) -> Self {
         const MASS: [(&str, &str); PARAMETERS] = [
             ("mass", "kg"),
             ("first moment x", "kg m"),
             ("first moment y", "kg m"),
             ("first moment z", "kg m"),
             ("inertia xx", "kg m2"),
-            ("inertia yy", "kg m2"),
-            ("inertia zz", "kg m2"),
             ("inertia xy", "kg m2"),
             ("inertia xz", "kg m2"),
+            ("inertia yy", "kg m2"),
             ("inertia yz", "kg m2"),
+            ("inertia zz", "kg m2"),
         ];
         let total: f64 = arm.masses().map(|mass| mass.mass_kg).sum::<f64>().max(0.1);
         let mut numbers = Vec::new();
         let mut add = |question, name: String, unit, before| numbers.push(Number { question, name, unit, before });
         let asked = matches!(question, Question::Masses | Question::All);
-        for (joint, mass) in arm.joints().iter().zip(arm.masses()) {
-            // A file's masses are within a tenth where they are not asked for, and anything where they are.
-            let usual = if asked { 0.5 } else { 0.1 };
-            let weight = usual * mass.mass_kg.max(0.02 * total / arm.joints().len() as f64);
+        for ((joint, mass), usual) in arm.joints().iter().zip(arm.masses()).zip(&usual) {
+            let length = usual.length_m.max(SHORTEST_M);
+            // A file's masses are within a tenth where they are not asked for, and within half where they are.
+            let share = if asked { 0.5 } else { 0.1 };
+            let weight = share * mass.mass_kg.max(0.02 * total / arm.joints().len() as f64);
             for (place, (name, unit)) in MASS.iter().enumerate() {
-                let before = weight * [1.0, 0.1, 0.01][usize::from(place > 0) + usize::from(place > 3)];
+                let before = weight * [1.0, length, length * length][usize::from(place > 0) + usize::from(place > 3)];
                 add(Question::Masses, format!("{name} at {}", joint.name), unit, before);
             }
         }
+        // As far from the tip's joint as links are long.
+        let length = usual.iter().map(|usual| usual.length_m).sum::<f64>() / usual.len() as f64;
+        let length = length.max(SHORTEST_M);
         // A payload is all that the last link's masses could be told from: who asks for these carries none.
         let carried = if question == Question::Masses { &[][..] } else { &MASS[..] };
         for (place, (name, unit)) in carried.iter().enumerate() {
-            let before = 0.1 * total * [1.0, 0.15, 0.01][usize::from(place > 0) + usize::from(place > 3)];
+            let before = 0.1 * total * [1.0, length, length * length][usize::from(place > 0) + usize::from(place > 3)];
             add(Question::Payload, format!("payload's {name}"), unit, before);
         }
-        for (joint, scale) in arm.joints().iter().zip(&scale) {
+        for (joint, usual) in arm.joints().iter().zip(&usual) {
             let of = |what: &str| format!("{what} of {}", joint.name);
             let (force, rate, inertia) =
                 if joint.slides { ("N", "N s/m", "kg") } else { ("N m", "N m s/rad", "kg m2") };
-            add(Question::Friction, of("Coulomb friction"), force, 0.2 * scale);
-            add(Question::Friction, of("viscous friction"), rate, 0.2 * scale);
-            add(Question::MotorInertia, of("motor's inertia"), inertia, 0.2 * scale);
+            add(Question::Friction, of("Coulomb friction"), force, 0.2 * usual.torque);
+            add(Question::Friction, of("viscous friction"), rate, 0.2 * usual.torque / usual.rate);
+            add(Question::MotorInertia, of("motor's inertia"), inertia, usual.inertia);
             add(Question::TorqueGain, of("torque gain"), "1", 0.3);
-            add(Question::TorqueOffset, of("torque offset"), force, 0.2 * scale);
+            add(Question::TorqueOffset, of("torque offset"), force, 0.2 * usual.torque);
         }
-        Self { arm, numbers, scale, question }
+        Self { arm, numbers, usual, question }
     }
 
     fn asked(&self, number: &Number) -> bool {
@@ -125,7 +141,7 @@ impl<'a> Unknowns<'a> {
             for (number, torques) in columns.iter().enumerate() {
                 for joint in 0..joints {
                     rows[(reading * joints + joint, number)] =
-                        torques[joint] * self.numbers[number].before / (NOISE * self.scale[joint]);
+                        torques[joint] * self.numbers[number].before / (NOISE * self.usual[joint].torque);
                 }
             }
         }
@@ -144,7 +160,8 @@ impl<'a> Unknowns<'a> {
         }
         let torques = state.torques();
         for (joint, sample) in samples.iter().enumerate() {
-            for value in [(sample.rate / TURNS_RPS).tanh(), sample.rate, sample.acceleration, torques[joint], 1.0] {
+            let turns = TURNS * self.usual[joint].rate;
+            for value in [(sample.rate / turns).tanh(), sample.rate, sample.acceleration, torques[joint], 1.0] {
                 let mut column = PerJoint::default();
                 column[joint] = value;
                 columns.push(column);

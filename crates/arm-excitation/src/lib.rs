@@ -2,7 +2,7 @@
 //!
 //! A motion is a Fourier series for each joint (Swevers, Ganseman, Tükel, De Schutter and Van Brussel 1997) that begins and ends at rest. Of the series
 //! that keep the limits, the one is sought whose log tells most: the expected information about the numbers in question, in nats (Lindley 1956),
-//! with everything else that a model may be wrong about unknown at the same time. For a linear model with normal errors and priors it is half the
+//! with what else a model may be wrong about unknown at the same time. For a linear model with normal errors and priors it is half the
 //! ln of a ratio of determinants (Bayesian D-optimality; Chaloner and Verdinelli 1995), whatever the true numbers are.
 //!
 //! Links are taken for rods between the joints, as thick as said. A motion should be looked at in a simulator before a robot makes it.

@@ -61,7 +61,8 @@ fn it_tells_more_than_random_motions_and_each_question_has_its_own() {
     assert!(friction.spreads.iter().all(|spread| spread.after < spread.before && spread.name.contains("friction")));
     let payload = found(&settings(Question::Payload));
     assert_eq!(payload.spreads.len(), 10);
-    // The number of nats that all numbers share is at least that of any of them.
+    let masses = found(&settings(Question::Masses));
+    assert!(masses.spreads.len() == 30 && masses.spreads.iter().all(|spread| !spread.name.contains("payload")));
     let all = found(&settings(Question::All));
     assert!(all.nats > friction.nats && all.nats > payload.nats, "{} {} {}", all.nats, friction.nats, payload.nats);
 }
@@ -70,10 +71,14 @@ fn it_tells_more_than_random_motions_and_each_question_has_its_own() {
 #[test]
 fn information_is_that_of_the_readings_too() {
     let arm = arm();
-    let excitation = found(&settings(Question::MotorInertia));
+    let excitation = found(&settings(Question::TorqueOffset));
     let spreads = &excitation.spreads;
-    // Typical torques, by way of the spreads before.
+    // Typical torques, by way of the spreads before; links are 0.2, 0.4 and 0.4 m long.
     let scale: Vec<f64> = spreads.iter().map(|spread| spread.before / 0.2).collect();
+    let inertia: Vec<f64> =
+        found(&settings(Question::MotorInertia)).spreads.iter().map(|spread| spread.before).collect();
+    let length = [0.2, 0.4, 0.4];
+    let rate = [1.0, 1.0, 1.5];
     let total: f64 = arm.masses().map(|mass| mass.mass_kg).sum();
     let readings = 80;
     let (mut others, mut asked): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -92,15 +97,17 @@ fn information_is_that_of_the_readings_too() {
         let torques = arm.motion(&of(0), &of(1), &of(2), &GRAVITY).regressor(link)[number];
         [torques[0], torques[1], torques[2]]
     };
-    let size = |number: usize| [1.0, 0.1, 0.1, 0.1, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01][number];
+    let size = |number: usize, length: f64| length.powi([0, 1, 1, 1, 2, 2, 2, 2, 2, 2][number]);
     for (link, mass) in arm.masses().enumerate() {
         let weight = 0.1 * mass.mass_kg.max(0.02 * total / 3.0);
         for number in 0..10 {
-            others.push(each(&|reading| regressor(reading, link, number).map(|t| t * weight * size(number))));
+            others.push(each(&|reading| {
+                regressor(reading, link, number).map(|t| t * weight * size(number, length[link]))
+            }));
         }
     }
     for number in 0..10 {
-        let wide = [1.0, 0.15, 0.15, 0.15, 0.01, 0.01, 0.01, 0.01, 0.01, 0.01][number];
+        let wide = size(number, 1.0 / 3.0);
         others.push(each(&|reading| regressor(reading, 2, number).map(|t| t * 0.1 * total * wide)));
     }
     let torques = |reading: usize| -> [f64; 3] {
@@ -114,11 +121,12 @@ fn information_is_that_of_the_readings_too() {
             each(&|reading| std::array::from_fn(|j| if j == joint { before * value(reading) } else { 0.0 }))
         };
         let before = 0.2 * scale;
-        others.push(only(&|reading| (samples(reading)[joint].rate / 0.01).tanh(), before));
-        others.push(only(&|reading| samples(reading)[joint].rate, before));
-        asked.push(only(&|reading| samples(reading)[joint].acceleration, before));
+        let rate = rate[joint];
+        others.push(only(&|reading| (samples(reading)[joint].rate / (0.01 * rate)).tanh(), before));
+        others.push(only(&|reading| samples(reading)[joint].rate, before / rate));
+        others.push(only(&|reading| samples(reading)[joint].acceleration, inertia[joint]));
         others.push(only(&|reading| torques(reading)[joint], 0.3));
-        others.push(only(&|_| 1.0, before));
+        asked.push(only(&|_| 1.0, before));
     }
     let half_log_determinant = |columns: &[Vec<f64>]| -> f64 {
         let x = DMatrix::from_fn(3 * readings, columns.len(), |row, column| columns[column][row]);

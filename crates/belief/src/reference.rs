@@ -43,7 +43,8 @@ impl ReferenceConfig {
     pub fn validate(&self) -> Result<(), Error> {
         let most = format!("between 2 and {MOST_PARTICLES}");
         require((2..=MOST_PARTICLES).contains(&self.particles), "particles", &self.particles, most.as_str())?;
-        require((1..=MOST_PARTICLES).contains(&self.sweeps), "sweeps", &self.sweeps, "1 or more")?;
+        let most = format!("between 1 and {MOST_PARTICLES}");
+        require((1..=MOST_PARTICLES).contains(&self.sweeps), "sweeps", &self.sweeps, most.as_str())?;
         let inside = self.effective_share > 0.0 && self.effective_share < 1.0;
         require(inside, "effective_share", &self.effective_share, "between 0 and 1")?;
         let share = self.prior_share > 0.0 && self.prior_share <= 1.0;
@@ -117,7 +118,8 @@ where
         }
         let logs = |step: f64| members.iter().map(move |m| step * (m.hypothesis.log_likelihood(1.0) - m.ratio));
         let rest = 1.0 - reached;
-        let least = config.effective_share * members.len() as f64;
+        // Of a first population that is nearly empty, as of any other: so it goes slowly at first.
+        let least = config.effective_share * config.particles as f64;
         let share = largest_power(least, |share| log_effective_sample_size(logs(share * rest)));
         let step = (share * rest).max(LEAST_STEP).min(rest);
         reached = if step == rest { 1.0 } else { reached + step };
@@ -179,6 +181,10 @@ impl<R: Replay, T: Teacher> Source<'_, R, T> {
         least: f64,
     ) -> (Option<Member<R::State>>, usize) {
         let ratio = self.log_ratio(&classes, &start);
+        // A broken teacher must not win.
+        if !ratio.is_finite() {
+            return (None, 0);
+        }
         let replayed = replay(self.episode, (classes, start, noise), 1.0, least);
         (replayed.hypothesis.map(|hypothesis| Member { hypothesis, ratio }), replayed.transitions)
     }

@@ -83,6 +83,9 @@ pub struct World {
     /// What the ruler says after the last action, where it was asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ruler: Option<Ruler>,
+    /// Why there is no ruler although it was asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ruler_failure: Option<String>,
 }
 
 /// Looks on and keeps what later replays need.
@@ -228,9 +231,17 @@ fn played<W: Acted>(
         of_network.push(draws(&Estimate::network(&history, &network))?);
     }
     onlooker.steps.iter().for_each(|(action, observation, joints)| history.push(*action, observation, joints));
-    let ruler = reference
-        .map(|particles| ruler(particles, &history, &Estimate::network(&history, &network), &start, &mut rng))
-        .transpose()?;
+    let estimate = Estimate::network(&history, &network);
+    let (mut ruler, ruler_failure) =
+        match reference.map(|particles| ruler(particles, &history, &estimate, &start, &mut rng)) {
+            Some(Ok(ruler)) => (Some(ruler), None),
+            Some(Err(error)) => (None, Some(format!("{error:#}"))),
+            None => (None, None),
+        };
+    // Where an obstacle can move, the chains say where it is in the end, and the truth where it was at first.
+    if problem.scenario.world.obstacle_mobility != ObstacleMobility::Fixed {
+        ruler.iter_mut().for_each(|ruler| ruler.row.obstacle_m = None);
+    }
     let touched =
         |row: &agent::StepRecord| row.large_force || row.obstacle_touched || moved(&row.observation, &observation);
     Ok(World {
@@ -246,6 +257,7 @@ fn played<W: Acted>(
         exponents: onlooker.exponents,
         seconds,
         ruler,
+        ruler_failure,
     })
 }
 

@@ -18,8 +18,8 @@ const NOISES: usize = 100;
 /// Spreads around the true obstacle, in standard deviations of the prior. Half of the obstacles are drawn so: those that explain a contact are few.
 const SPREADS: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
 /// Chains agree where the scale reduction of mass and friction is at most this, and the probabilities of an obstacle differ by at most that.
-const MOST_SCALE: f64 = 1.05;
-const MOST_DIFFERENCE: f64 = 0.05;
+pub(super) const MOST_SCALE: f64 = 1.05;
+pub(super) const MOST_DIFFERENCE: f64 = 0.05;
 
 /// One run of the sampler.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -114,33 +114,14 @@ fn told(history: &History<'_>, truth: &Particle, rng: &mut Rng) -> Result<f64> {
     let some: f64 = probabilities[..NO_OBSTACLE].iter().sum();
     let of_some: Vec<f64> = probabilities[..NO_OBSTACLE].iter().map(|p| p / some).collect();
     let near = if true_class == NO_OBSTACLE { 0.0 } else { 0.5 };
-    let half_square = |z: &[f64]| 0.5 * z.iter().map(|z| z * z).sum::<f64>();
+    let proposal = Proposal { centre: centre[OBSTACLE].to_vec(), class: true_class, near, of_some };
     let mut with = Vec::new();
     for _ in 0..OBSTACLES {
         let mut z = centre.clone();
-        let class = if rng.random::<f64>() < near {
-            let spread = SPREADS[rng.random_range(0..SPREADS.len())];
-            z[OBSTACLE].iter_mut().for_each(|z| *z += spread * normal(rng));
-            true_class
-        } else {
-            z[OBSTACLE].iter_mut().for_each(|z| *z = normal(rng));
-            push_task::sampling::categorical(&of_some, rng)
-        };
-        // ln of the density that it was drawn with over the prior's, both of classes with an obstacle.
-        let around = if class == true_class {
-            let off: Vec<f64> = z[OBSTACLE].iter().zip(&centre[OBSTACLE]).map(|(z, c)| z - c).collect();
-            let density = |spread: f64| {
-                (-half_square(&off) / (spread * spread)).exp()
-                    / spread.powi(i32::try_from(off.len()).unwrap_or(i32::MAX))
-            };
-            let mean = SPREADS.map(density).iter().sum::<f64>() / SPREADS.len() as f64;
-            mean.ln() + half_square(&z[OBSTACLE]) - of_some[class].ln()
-        } else {
-            f64::NEG_INFINITY
-        };
-        let ratio = log_mean(&[around + near.ln(), (1.0 - near).ln()]) + 2.0_f64.ln();
+        let (class, obstacle) = proposal.draw(rng);
+        z[OBSTACLE].copy_from_slice(&obstacle);
         with.push(match history.start(&[shape, class], &z) {
-            Some((state, _)) => replayed(history, state, truth, rng) - ratio,
+            Some((state, _)) => replayed(history, state, truth, rng) - proposal.log_ratio(class, &obstacle),
             None => f64::NEG_INFINITY,
         });
     }
@@ -152,6 +133,42 @@ fn told(history: &History<'_>, truth: &Particle, rng: &mut Rng) -> Result<f64> {
         return Err(anyhow!("not even the true world explains the history"));
     }
     Ok(1.0 / (1.0 + (without - with).exp()))
+}
+
+/// What obstacles are drawn from: their prior, and the surroundings of the true one.
+struct Proposal {
+    /// Coordinates of the true obstacle, and its class.
+    centre: Vec<f64>,
+    class: usize,
+    /// Share that is drawn near it.
+    near: f64,
+    /// Probabilities of the classes with an obstacle.
+    of_some: Vec<f64>,
+}
+
+impl Proposal {
+    fn draw(&self, rng: &mut Rng) -> (usize, Vec<f64>) {
+        if rng.random::<f64>() < self.near {
+            let spread = SPREADS[rng.random_range(0..SPREADS.len())];
+            return (self.class, self.centre.iter().map(|z| z + spread * normal(rng)).collect());
+        }
+        let z = self.centre.iter().map(|_| normal(rng)).collect();
+        (push_task::sampling::categorical(&self.of_some, rng), z)
+    }
+
+    /// ln of its density over that of the prior.
+    fn log_ratio(&self, class: usize, z: &[f64]) -> f64 {
+        let half_square = |z: &[f64]| 0.5 * z.iter().map(|z| z * z).sum::<f64>();
+        let mut parts = vec![(1.0 - self.near).ln()];
+        if class == self.class && self.near > 0.0 {
+            let off: Vec<f64> = z.iter().zip(&self.centre).map(|(z, c)| z - c).collect();
+            let share = self.near / (SPREADS.len() as f64 * self.of_some[class]);
+            parts.extend(SPREADS.iter().map(|spread| {
+                share.ln() - half_square(&off) / (spread * spread) - off.len() as f64 * spread.ln() + half_square(z)
+            }));
+        }
+        log_mean(&parts) + (parts.len() as f64).ln()
+    }
 }
 
 /// ln likelihood of all steps in the true world with the obstacle of `drawn`.
@@ -176,4 +193,28 @@ fn log_mean(logs: &[f64]) -> f64 {
         return most;
     }
     most + (logs.iter().map(|log| (log - most).exp()).sum::<f64>() / logs.len() as f64).ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use pomdp::{Purpose, Seed};
+
+    use super::*;
+
+    #[test]
+    fn weights_of_drawn_obstacles_average_to_one_and_carry_expectations_over_to_the_prior() {
+        let proposal = Proposal { centre: vec![0.7, -1.2], class: 1, near: 0.5, of_some: vec![0.2, 0.5, 0.3] };
+        let mut rng = Seed(5).stream(Purpose::Test, 0);
+        let (mut weights, mut first, mut of_class) = (0.0, 0.0, 0.0);
+        let n = 200_000;
+        for _ in 0..n {
+            let (class, z) = proposal.draw(&mut rng);
+            let weight = (-proposal.log_ratio(class, &z)).exp();
+            weights += weight / f64::from(n);
+            first += weight * z[0] / f64::from(n);
+            of_class += if class == 1 { weight / f64::from(n) } else { 0.0 };
+        }
+        assert!((weights - 1.0).abs() < 0.01 && first.abs() < 0.02, "{weights} {first}");
+        assert!((of_class - 0.5).abs() < 0.01, "{of_class}");
+    }
 }

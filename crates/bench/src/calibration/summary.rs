@@ -82,6 +82,7 @@ pub(super) fn summary(worlds: &[World], provenance: &Value) -> Value {
         summary["reference"] = json!({
             "all": beside(&ruled, &mut rng),
             "chains_agree": beside(&agreed, &mut rng),
+            "failed": worlds.iter().filter(|w| w.ruler_failure.is_some()).count(),
             "transitions_per_chain": per_update(
                 &ruled.iter().flat_map(|(_, r)| r.chains.iter().map(|c| c.transitions as f64)).collect::<Vec<_>>()
             ),

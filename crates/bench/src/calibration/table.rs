@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::episode::NUMBERS;
+use super::reference::{MOST_DIFFERENCE, MOST_SCALE};
 use super::summary::{SOURCES, STEPS};
 
 /// Columns: figure, title, digits.
@@ -70,15 +71,17 @@ pub fn table(summary: &Value) -> String {
     text
 }
 
-/// The belief after the last action beside the exact posterior.
+/// The last belief beside samples of the exact posterior.
 fn reference(reference: &Value, text: &mut String) {
     if reference.is_null() {
         return;
     }
     *text += &format!(
-        "\nBeside the exact posterior after the last action, by annealed sequential Monte Carlo: two chains of {} transitions on average. \
-         They agree where R̂ of ln mass and friction is at most 1.05 and P(obstacle) differs by at most 0.05. `told` knows all but the obstacle.\n\n",
-        number(&reference["transitions_per_chain"], 0)
+        "\nThe last belief beside the exact posterior, as two chains of annealed sequential Monte Carlo sample it (`reference`: both together), {} \
+         transitions each on average. They agree where R̂ of ln mass and friction is at most {MOST_SCALE} and P(obstacle) differs by at most \
+         {MOST_DIFFERENCE}; elsewhere at least one has missed something. `told` knows all but the obstacle. Worlds without a ruler: {}.\n\n",
+        number(&reference["transitions_per_chain"], 0),
+        reference["failed"]
     );
     *text += "| worlds | belief |";
     COLUMNS.iter().for_each(|(_, title, _)| *text += &format!(" {title} |"));
