@@ -51,6 +51,8 @@ const PLAYS_RAD: [f64; 6] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05];
 const GIVE_DAMPING: [f64; 2] = [0.3, 1.0];
 const FLANK_DAMPING: f64 = 0.3;
 const SPREAD: f64 = 1.5;
+/// Largest lag that torques are taken as linear in.
+const MOST_LAG_RAD: f64 = 0.5;
 
 /// Spreads of what a nominal model is wrong about although nothing is missing.
 mod nuisance {
@@ -258,6 +260,12 @@ impl Catalogue {
         let scale = prepared.scale[joint];
         let mut held = |name: &str, shape: (f64, f64), size: f64, gear: Gear| {
             let Lag { angle, second } = lag(prepared, joint, gear);
+            // So soft a gear lets its link fall, and torques are not linear in what it gives.
+            if !angle.iter().chain(&second).all(|value| value.is_finite())
+                || angle.iter().any(|lag| lag.abs() > MOST_LAG_RAD)
+            {
+                return;
+            }
             let column = turned(prepared, joint, &angle, Some(&second));
             let per_size = column.iter().map(|value| value / size).collect();
             let place = self.push(None, per_size, SPREAD * size, true);

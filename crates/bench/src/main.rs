@@ -58,8 +58,7 @@ enum What {
         /// docs/src/reference/world-protocol.md.
         #[arg(long, value_name = "COMMAND|ADDRESS")]
         world: Option<WorldAddress>,
-        /// Also samples the exact posterior at the last belief, twice, with so many particles, and asks what is known of the obstacle where all
-        /// else is known. Takes minutes a world.
+        /// Also samples the exact posterior at the last belief, twice, with so many particles. Takes minutes a world.
         #[arg(long, value_name = "PARTICLES", value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
         reference: Option<u32>,
         /// Folder of the results. Worlds that it has are not played again.

@@ -107,9 +107,7 @@ fn beside(ruled: &[(&World, &Ruler)], rng: &mut Rng) -> Value {
         }
         sources.insert(name.into(), Value::Object(figures));
     }
-    let told = |w: &World, ruler: &Ruler| (ruler.told - f64::from(u8::from(w.has_obstacle))).powi(2);
-    let told: Vec<f64> = ruled.iter().map(|(w, r)| told(w, r)).collect();
-    json!({ "worlds": ruled.len(), "sources": sources, "told_obstacle_brier": interval(&told, rng) })
+    json!({ "worlds": ruled.len(), "sources": sources })
 }
 
 fn at(rows: &[Row], step: usize) -> Option<&Row> {

@@ -79,7 +79,7 @@ fn reference(reference: &Value, text: &mut String) {
     *text += &format!(
         "\nThe last belief beside the exact posterior, as two chains of annealed sequential Monte Carlo sample it (`reference`: both together), {} \
          transitions each on average. They agree where R̂ of ln mass and friction is at most {MOST_SCALE} and P(obstacle) differs by at most \
-         {MOST_DIFFERENCE}; elsewhere at least one has missed something. `told` knows all but the obstacle. Worlds without a ruler: {}.\n\n",
+         {MOST_DIFFERENCE}; elsewhere at least one has missed something. Worlds without a ruler: {}.\n\n",
         number(&reference["transitions_per_chain"], 0),
         reference["failed"]
     );
@@ -96,8 +96,6 @@ fn reference(reference: &Value, text: &mut String) {
             values.extend(["mass", "friction"].map(|name| interval(&cells[format!("{name}_coverage_90")], 2)));
             *text += &format!("| {title} | {source} | {} |\n", values.join(" | "));
         }
-        let told = interval(&part["told_obstacle_brier"], 3);
-        *text += &format!("| {title} | told | {told} |{}\n", " – |".repeat(COLUMNS.len() + 1));
     }
 }
 
