@@ -181,7 +181,14 @@ fn reach(arm: &Arm) -> f64 {
             .zip(PRIMES)
             .map(|(joint, prime)| {
                 let share = (f64::from(i) * prime.sqrt()).fract();
-                let (lower, upper) = (joint.lower.max(-std::f64::consts::PI), joint.upper.min(std::f64::consts::PI));
+                // Of a joint without limits one turn is all.
+                let turn = 2.0 * std::f64::consts::PI;
+                let (lower, upper) = match (joint.lower.is_finite(), joint.upper.is_finite()) {
+                    (true, true) => (joint.lower, joint.upper),
+                    (true, false) => (joint.lower, joint.lower + turn),
+                    (false, true) => (joint.upper - turn, joint.upper),
+                    (false, false) => (-0.5 * turn, 0.5 * turn),
+                };
                 lower + share * (upper - lower)
             })
             .collect();
