@@ -209,6 +209,7 @@ impl Effect {
             (_, "gain") => "within about 0.4 of 1",
             (_, "rate") => "within about 20 % of the usual torque, over the log",
             (_, "limit") => "what 3 to 50 % of the commanded torques exceed",
+            ("backlash", "stiffness") => "turns by up to about 0.005 rad under the usual torque",
             (_, "stiffness") => "turns by up to about 0.1 rad under the usual torque",
             (_, "play") => "up to about 0.05",
             (_, "mass") => "within about 10 % of the arm's",

@@ -43,7 +43,7 @@ pub(crate) struct Catalogue {
     pub(crate) candidates: Vec<Candidate>,
 }
 
-/// Settings, three or four a decade: what gears give under a joint's typical torque, rad, with and without play; play, rad; their damping ratios. The prior
+/// Settings, one to four a decade: what gears give under a joint's typical torque, rad, with and without play; play, rad; their damping ratios. The prior
 /// spread of a size is a multiple of its setting.
 const GIVES_RAD: [f64; 9] = [0.001, 0.0018, 0.0032, 0.0056, 0.01, 0.018, 0.032, 0.056, 0.1];
 const FLANK_GIVES_RAD: [f64; 3] = [0.0002, 0.001, 0.005];

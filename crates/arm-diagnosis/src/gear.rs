@@ -1,8 +1,8 @@
 //! A gear that gives or has play, between a motor whose angle is read and its link.
 //!
-//! The link moves by itself where the gear does not hold it. With the motor's angle q as it was read, the link's angle q + d obeys
-//! M d̈ + K d = g(d, ḋ) − τ, where τ is the torque that the gear would have to pass on if it were stiff (Spong 1987), M the inertia about the joint
-//! and K the change of τ with the angle. g is the gear's own torque: −k d − c ḋ of a spring, and the same beyond the flanks where there is play.
+//! The link moves by itself where the gear does not hold it. With the motor's angle q as it was read, the link's angle is q + d, and
+//! M d̈ + K d = g(d, ḋ) − τ (Spong 1987). τ is the torque that the gear would have to pass on if it were stiff, M the inertia about the joint and K the
+//! change of τ with the angle. g is the gear's own torque: −k d − c ḋ of a spring, and the same beyond the flanks where there is play.
 
 use crate::prepared::Prepared;
 
@@ -48,7 +48,8 @@ pub(crate) fn lag(prepared: &Prepared, joint: usize, gear: Gear) -> Lag {
         let later = span.clone().find(|tick| !soon(tick)).unwrap_or(first);
         let apart = prepared.ticks.time_secs[later] - begun;
         let (start, then) = (gear.rest(&at(first)), gear.rest(&at(later)));
-        let rate = if apart > 0.0 && start.side == then.side { (then.angle - start.angle) / apart } else { 0.0 };
+        let held = gear.play == 0.0 || start.side == then.side;
+        let rate = if apart > 0.0 && held { (then.angle - start.angle) / apart } else { 0.0 };
         let mut state = Ahead { angle: start.angle, rate };
         for tick in span.clone() {
             let next = tick + 1;

@@ -48,7 +48,7 @@ pub(crate) struct Excite {
     /// There is no floor.
     #[arg(long)]
     no_floor: bool,
-    /// Motions that are tried.
+    /// Motions that are tried, 64 or more.
     #[arg(long, default_value_t = 2000)]
     tries: usize,
     /// Of all that is drawn.

@@ -23,9 +23,7 @@ pub enum Error {
     #[error("{0}")]
     Setting(String),
     /// No series was found that keeps the limits.
-    #[error(
-        "no motion of {seconds} s was found that keeps the limits: {why}; expected more time, a lower `--floor`, thinner links or a lower `--speed`"
-    )]
+    #[error("no motion of {seconds} s was found that keeps the limits: {why}")]
     Limits {
         /// Length of the motion, s.
         seconds: f64,

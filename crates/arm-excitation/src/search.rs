@@ -103,6 +103,9 @@ pub fn excitation(
             joint.name
         )));
     }
+    if arm.masses().all(|mass| mass.mass_kg <= 0.0) {
+        return Err(Error::Setting("the arm has no mass in the file, expected masses of its links".into()));
+    }
     let mut rng = Seed(settings.seed).stream(Purpose::Exploration, 0);
     let task = Task::new(arm, settings, &mut rng);
     let count = NUMBERS * arm.joints().len();
@@ -162,7 +165,7 @@ impl Settings {
         within("speed", self.speed, 0.01, 1.0)?;
         within("radius", self.radius_m, 0.0, 1.0)?;
         within("floor", self.floor_m.unwrap_or(0.0), -10.0, 10.0)?;
-        within("tries", self.tries as f64, 1.0, 1e6)
+        within("tries", self.tries as f64, STARTS as f64, 1e6)
     }
 }
 
@@ -173,7 +176,7 @@ impl<'a> Task<'a> {
             rooms.iter().map(|room| room.lower + (room.upper - room.lower).max(0.0) * rng.random::<f64>()).collect()
         };
         let postures: Vec<Vec<f64>> = (0..64).map(|_| posture(rng)).collect();
-        let usual = usual(arm, &rooms, &postures);
+        let usual = usual(arm, settings.speed, &rooms, &postures);
         let rods = Rods::new(arm, settings.radius_m, settings.floor_m, postures.into_iter());
         let unknowns = Unknowns::new(arm, usual, settings.question);
         Self { arm, settings, rooms, rods, unknowns }
@@ -236,21 +239,23 @@ impl<'a> Task<'a> {
     }
 
     fn why(&self, motion: &Motion) -> String {
-        let (torque, room) = self.excesses(motion);
-        if torque > room {
-            format!(
-                "it takes more than {:.0} % of a motor's torque; expected stronger motors, or a lower speed",
-                100.0 * EFFORT
-            )
-        } else {
-            "links meet each other or the floor; expected a lower floor, thinner links or more tries".into()
+        match self.excesses(motion) {
+            (torque, room) if torque + room < NOTHING => "what a log would tell cannot be computed".into(),
+            (torque, room) if torque > room => {
+                let most = 100.0 * EFFORT;
+                format!(
+                    "the arm's own weight and motion take more than {most:.0} % of a motor's torque; expected stronger motors or more tries"
+                )
+            }
+            _ => "links meet each other or the floor; expected a lower floor, thinner links or more tries".into(),
         }
     }
 
     fn cost(&self, numbers: &[f64]) -> f64 {
         let motion = self.motion(numbers);
         let excess = self.excess(&motion);
-        if excess < NOTHING { -self.unknowns.nats(&motion) } else { BROKEN * (1.0 + excess) }
+        let nats = self.unknowns.nats(&motion);
+        if excess < NOTHING && nats.is_finite() { -nats } else { BROKEN * (1.0 + excess) }
     }
 }
 
@@ -265,7 +270,7 @@ impl CostFunction for &Task<'_> {
 }
 
 /// What is usual in each joint: torques that hold it and that accelerate all joints by 1 rad/s², over postures; at least a hundredth of the largest.
-fn usual(arm: &Arm, rooms: &[Room], postures: &[Vec<f64>]) -> Vec<Usual> {
+fn usual(arm: &Arm, speed: f64, rooms: &[Room], postures: &[Vec<f64>]) -> Vec<Usual> {
     let count = arm.joints().len();
     let (zero, one) = (vec![0.0; count], vec![1.0; count]);
     let (mut squares, mut inertia) = (vec![0.0; count], vec![0.0; count]);
@@ -287,7 +292,7 @@ fn usual(arm: &Arm, rooms: &[Room], postures: &[Vec<f64>]) -> Vec<Usual> {
     each.map(|(((square, inertia), length_m), room)| Usual {
         torque: square.sqrt().max(0.01 * most).max(1e-12),
         inertia: inertia.max(1e-15),
-        rate: room.rate.max(1e-9),
+        rate: (room.rate / speed).max(1e-9),
         length_m,
     })
     .collect()

@@ -78,7 +78,7 @@ fn information_is_that_of_the_readings_too() {
     let inertia: Vec<f64> =
         found(&settings(Question::MotorInertia)).spreads.iter().map(|spread| spread.before).collect();
     let length = [0.2, 0.4, 0.4];
-    let rate = [1.0, 1.0, 1.5];
+    let rate = [2.0, 2.0, 3.0];
     let total: f64 = arm.masses().map(|mass| mass.mass_kg).sum();
     let readings = 80;
     let (mut others, mut asked): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -149,9 +149,23 @@ fn what_cannot_be_is_refused() {
         Settings { speed: 0.0, ..Settings::default() },
         Settings { radius_m: -0.1, ..Settings::default() },
         Settings { floor_m: Some(f64::INFINITY), ..Settings::default() },
-        Settings { tries: 0, ..Settings::default() },
+        Settings { tries: 63, ..Settings::default() },
     ] {
         assert!(matches!(refused(&wrong), Error::Setting(_)), "{wrong:?}");
+    }
+    // A motor that cannot hold its link.
+    let path = Path::new("weak.urdf");
+    let weak = URDF.replace(r#"velocity="3" effort="9""#, r#"velocity="3" effort="0.01""#);
+    let weak = Arm::new(&urdf_file::parse(path, &weak).unwrap(), path, &Selection::default()).unwrap();
+    let error = excitation(&weak, &Settings { tries: 100, ..Settings::default() }, |_, _, _| {}).unwrap_err();
+    assert!(matches!(&error, Error::Limits { why, .. } if why.contains("torque")), "{error}");
+    let light = URDF
+        .replace(r#"<mass value="2"/>"#, r#"<mass value="0"/>"#)
+        .replace(r#"<mass value="1.5"/>"#, r#"<mass value="0"/>"#);
+    let light = light.replace(r#"<mass value="1"/>"#, r#"<mass value="0"/>"#);
+    if let Ok(light) = urdf_file::parse(path, &light).map(|urdf| Arm::new(&urdf, path, &Selection::default())) {
+        let refused = light.map(|arm| excitation(&arm, &Settings::default(), |_, _, _| {}));
+        assert!(!matches!(refused, Ok(Ok(_))), "{refused:?}");
     }
     // A floor above the arm.
     let high = Settings { floor_m: Some(2.0), tries: 100, ..Settings::default() };
