@@ -232,16 +232,8 @@ fn played<W: Acted>(
     }
     onlooker.steps.iter().for_each(|(action, observation, joints)| history.push(*action, observation, joints));
     let estimate = Estimate::network(&history, &network);
-    let (mut ruler, ruler_failure) =
-        match reference.map(|particles| ruler(particles, &history, &estimate, &start, &mut rng)) {
-            Some(Ok(ruler)) => (Some(ruler), None),
-            Some(Err(error)) => (None, Some(format!("{error:#}"))),
-            None => (None, None),
-        };
-    // Where an obstacle can move, the chains say where it is in the end, and the truth where it was at first.
-    if problem.scenario.world.obstacle_mobility != ObstacleMobility::Fixed {
-        ruler.iter_mut().for_each(|ruler| ruler.row.obstacle_m = None);
-    }
+    let asked = reference.map(|particles| ruler(particles, &history, &estimate, &start, &mut rng));
+    let (ruler, ruler_failure) = ruled(asked, problem.scenario.world.obstacle_mobility);
     let touched =
         |row: &agent::StepRecord| row.large_force || row.obstacle_touched || moved(&row.observation, &observation);
     Ok(World {
@@ -259,6 +251,21 @@ fn played<W: Acted>(
         ruler,
         ruler_failure,
     })
+}
+
+/// A ruler, or why there is none.
+fn ruled(asked: Option<Result<Ruler>>, mobility: ObstacleMobility) -> (Option<Ruler>, Option<String>) {
+    match asked {
+        Some(Ok(mut ruler)) => {
+            // Where an obstacle can move, the chains say where it is in the end, and the truth where it was at first.
+            if mobility != ObstacleMobility::Fixed {
+                ruler.row.obstacle_m = None;
+            }
+            (Some(ruler), None)
+        }
+        Some(Err(error)) => (None, Some(format!("{error:#}"))),
+        None => (None, None),
+    }
 }
 
 /// Whether the object is seen 1 cm or more from where it was first seen: five standard deviations.
