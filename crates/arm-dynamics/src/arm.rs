@@ -56,6 +56,20 @@ pub struct ArmJoint {
     pub friction: f64,
 }
 
+impl ArmJoint {
+    /// Lowest and highest position: the limits, and one turn (2π m where it slides) where one of them is missing.
+    #[must_use]
+    pub fn range(&self) -> (f64, f64) {
+        const TURN: f64 = std::f64::consts::TAU;
+        match (self.lower.is_finite(), self.upper.is_finite()) {
+            (true, true) => (self.lower, self.upper),
+            (true, false) => (self.lower, self.lower + TURN),
+            (false, true) => (self.upper - TURN, self.upper),
+            (false, false) => (-0.5 * TURN, 0.5 * TURN),
+        }
+    }
+}
+
 /// A serial arm on a base that does not move.
 #[derive(Clone, Debug)]
 pub struct Arm {

@@ -28,8 +28,8 @@ pub(crate) struct Excite {
     #[arg(long)]
     tip: Option<String>,
     /// What the log should tell, with what else may be wrong unknown as well; for masses no payload is carried.
-    #[arg(long, value_enum, default_value_t = Tell::All)]
-    tell: Tell,
+    #[arg(long, value_enum, default_value_t = Question::All)]
+    tell: Question,
     /// Length, s.
     #[arg(long, default_value_t = 20.0)]
     seconds: f64,
@@ -62,32 +62,6 @@ pub(crate) struct Excite {
     out: PathBuf,
 }
 
-/// Values of `--tell`.
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Tell {
-    Friction,
-    Payload,
-    Masses,
-    MotorInertia,
-    TorqueGain,
-    TorqueOffset,
-    All,
-}
-
-impl From<Tell> for Question {
-    fn from(tell: Tell) -> Self {
-        match tell {
-            Tell::Friction => Self::Friction,
-            Tell::Payload => Self::Payload,
-            Tell::Masses => Self::Masses,
-            Tell::MotorInertia => Self::MotorInertia,
-            Tell::TorqueGain => Self::TorqueGain,
-            Tell::TorqueOffset => Self::TorqueOffset,
-            Tell::All => Self::All,
-        }
-    }
-}
-
 pub(crate) fn run(asked: &Excite) -> Result<()> {
     let selection = Selection { joints: asked.joints.clone(), tip: asked.tip.clone() };
     let folder = asked.out.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -95,7 +69,7 @@ pub(crate) fn run(asked: &Excite) -> Result<()> {
     let arm = Arm::open(&asked.file, &selection)?;
     ensure!(!asked.out.exists(), "{} is there already: choose another name", asked.out.display());
     let settings = Settings {
-        question: asked.tell.into(),
+        question: asked.tell,
         seconds: asked.seconds,
         speed: asked.speed,
         radius_m: asked.radius,
@@ -121,9 +95,8 @@ pub(crate) fn run(asked: &Excite) -> Result<()> {
     let written = whole_file::write(&asked.out, text.as_bytes(), Existing::Keep)?;
     ensure!(written, "{} is there already: choose another name", asked.out.display());
     if asked.json {
-        let middle = found.random_median();
         let summary = json!({
-            "question": settings.question, "nats": found.nats, "random_nats_median": middle,
+            "question": settings.question, "nats": found.nats, "random_nats_median": found.random_median,
             "random_motions": found.random, "random_motions_that_keep_the_limits": found.random_nats.len(),
             "spreads": found.spreads, "notes": found.notes.iter().chain(arm.notes()).collect::<Vec<_>>(),
         });
@@ -178,7 +151,7 @@ fn print(found: &Excitation, of_file: &[String]) {
     program::out!(
         "Standard deviations before the log and after it, where torques are off by 2 % of what is typical, anew every 0.1 s."
     );
-    let compared = match found.random_median() {
+    let compared = match found.random_median {
         Some(middle) => format!(
             "of {} random motions, wide and small, {} keep the limits and tell {middle:.1} in the middle",
             found.random,

@@ -15,7 +15,7 @@ const TURNS: f64 = 0.01;
 const SHORTEST_M: f64 = 1e-4;
 
 /// What a log should tell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Question {
     /// Coulomb and viscous friction of all joints.

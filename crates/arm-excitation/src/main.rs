@@ -181,14 +181,7 @@ fn reach(arm: &Arm) -> f64 {
             .zip(PRIMES)
             .map(|(joint, prime)| {
                 let share = (f64::from(i) * prime.sqrt()).fract();
-                // Of a joint without limits one turn is all.
-                let turn = 2.0 * std::f64::consts::PI;
-                let (lower, upper) = match (joint.lower.is_finite(), joint.upper.is_finite()) {
-                    (true, true) => (joint.lower, joint.upper),
-                    (true, false) => (joint.lower, joint.lower + turn),
-                    (false, true) => (joint.upper - turn, joint.upper),
-                    (false, false) => (-0.5 * turn, 0.5 * turn),
-                };
+                let (lower, upper) = joint.range();
                 lower + share * (upper - lower)
             })
             .collect();

@@ -12,8 +12,6 @@ pub(crate) const NUMBERS: usize = 2 * HARMONICS + 2;
 const GRID: usize = 200;
 /// Share of a joint's room, at both ends together, that is left free.
 const MARGIN: f64 = 0.1;
-/// Room of a joint that turns without limits: half a turn each way.
-const UNLIMITED: f64 = std::f64::consts::PI;
 /// Fastest rates of joints whose file says none: rad/s, and m/s of those that slide.
 pub(crate) const RATE: [f64; 2] = [1.0, 0.2];
 
@@ -54,12 +52,7 @@ impl Room {
     /// Of each joint, at `speed` times its fastest.
     pub(crate) fn of(arm: &Arm, speed: f64) -> Vec<Self> {
         let room = |joint: &arm_dynamics::ArmJoint| {
-            let (lower, upper) = match (joint.lower.is_finite(), joint.upper.is_finite()) {
-                (true, true) => (joint.lower, joint.upper),
-                (true, false) => (joint.lower, joint.lower + 2.0 * UNLIMITED),
-                (false, true) => (joint.upper - 2.0 * UNLIMITED, joint.upper),
-                (false, false) => (-UNLIMITED, UNLIMITED),
-            };
+            let (lower, upper) = joint.range();
             let free = 0.5 * MARGIN * (upper - lower).max(0.0);
             let usual = RATE[usize::from(joint.slides)];
             let rate = if joint.velocity.is_finite() && joint.velocity > 0.0 { joint.velocity } else { usual };

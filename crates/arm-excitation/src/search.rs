@@ -59,22 +59,14 @@ pub struct Excitation {
     pub nats: f64,
     /// The same of random series, from wide to small ones, that keep the limits; sorted.
     pub random_nats: Vec<f64>,
+    /// Their median; none where there is none.
+    pub random_median: Option<f64>,
     /// Random series that were tried.
     pub random: usize,
     /// How well each number would be known.
     pub spreads: Vec<Spread>,
     /// What was assumed, a sentence each.
     pub notes: Vec<String>,
-}
-
-impl Excitation {
-    /// The median of what random motions that keep the limits tell; none where there is none.
-    #[must_use]
-    pub fn random_median(&self) -> Option<f64> {
-        let (sorted, half) = (&self.random_nats, self.random_nats.len() / 2);
-        let upper = sorted.get(half)?;
-        Some(if sorted.len() % 2 == 1 { *upper } else { 0.5 * (sorted[half - 1] + upper) })
-    }
 }
 
 struct Task<'a> {
@@ -121,12 +113,8 @@ pub fn excitation(
             (task.cost(&numbers), numbers)
         })
         .collect();
-    let mut random_nats: Vec<f64> = drawn
-        .iter()
-        .filter(|(_, numbers)| task.excess(&task.motion(numbers)) < NOTHING)
-        .map(|(cost, _)| -cost)
-        .collect();
-    random_nats.sort_by(f64::total_cmp);
+    let mut random_nats: Vec<f64> = drawn.iter().map(|(cost, _)| -cost).filter(|nats| *nats > -BROKEN).collect();
+    let random_median = statistics::quantile(&mut random_nats, 0.5);
     let first = drawn.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let (mut least, mut best) = first.unwrap_or((f64::INFINITY, vec![0.0; count]));
     let most = |least: f64| if least < BROKEN { Some(-least) } else { None };
@@ -147,7 +135,8 @@ pub fn excitation(
         return Err(Error::Limits { seconds: settings.seconds, why: task.why(&motion) });
     }
     let spreads = task.unknowns.spreads(&motion);
-    Ok(Excitation { nats: -least, random_nats, random: STARTS, spreads, motion, notes: task.notes() })
+    let notes = task.notes();
+    Ok(Excitation { nats: -least, random_nats, random_median, random: STARTS, spreads, motion, notes })
 }
 
 impl Settings {

@@ -3,45 +3,14 @@
 mod line;
 
 use belief::{Particles, Reference, ReferenceConfig, reference};
-use line::gaussian::Gaussian;
-use line::{Exact, HEIGHT, Line, NOW, SLOPE, State, log_gaussian};
-use pomdp::{Purpose, Rng, Seed, Teacher};
-use rand::RngExt as _;
+use line::guess::Guess;
+use line::{Exact, Line, NOW, SLOPE, State};
+use pomdp::{Purpose, Seed};
 
-/// The prior, moved and stretched: a teacher that is badly wrong.
-struct Wrong {
-    second: (f64, f64),
-    parts: [Gaussian; 2],
-}
-
-impl Wrong {
-    fn new(line: &Line, shift: f64, width: f64) -> Self {
-        let prior = Exact::new(&Line::new(line.q, line.r, line.second()));
-        let part = |class: usize| {
-            let mut part = Gaussian::of(&prior.parts[class], 2 + class, [1.0, 1.0, HEIGHT]);
-            for i in 0..part.size {
-                part.mean[i] += shift;
-                part.factor[i].iter_mut().for_each(|value| *value *= width);
-            }
-            part
-        };
-        Self { second: (0.1, line.second()), parts: [part(0), part(1)] }
-    }
-}
-
-impl Teacher for Wrong {
-    fn draw(&self, rng: &mut Rng) -> Option<(Vec<usize>, Vec<f64>)> {
-        let class = usize::from(rng.random::<f64>() < self.second.0);
-        Some((vec![class], self.parts[class].draw(rng)))
-    }
-
-    fn log_ratio(&self, classes: &[usize], start: &[f64]) -> f64 {
-        let class = classes[0];
-        let z = [start[0], start[1], if class == 1 { start[2] } else { 0.0 }];
-        let probability = |second: f64| if class == 1 { second } else { 1.0 - second };
-        let prior: f64 = z[..2 + class].iter().map(|z| log_gaussian(*z, 1.0)).sum();
-        (probability(self.second.0) / probability(self.second.1)).ln() + self.parts[class].log_density(z) - prior
-    }
+/// The prior, moved by `shift` standard deviations and `width` times as wide, with another probability of a second body: a teacher that is badly wrong.
+fn wrong(line: &Line, shift: f64, width: f64) -> Guess {
+    let before = Line::new(line.q, line.r, line.second());
+    Guess { second: (0.1, line.second()), ..Guess::wrong(&before, shift, width, 0.0) }
 }
 
 fn line(q: f64, steps: usize, item: u64) -> Line {
@@ -52,7 +21,7 @@ fn line(q: f64, steps: usize, item: u64) -> Line {
     line
 }
 
-fn sample(line: &Line, teacher: &Wrong, item: u64) -> Reference<State> {
+fn sample(line: &Line, teacher: &Guess, item: u64) -> Reference<State> {
     let config = ReferenceConfig { particles: 1000, ..ReferenceConfig::default() };
     reference(&config, line, teacher, &mut Seed(32).stream(Purpose::Test, item)).unwrap()
 }
@@ -72,7 +41,7 @@ fn a_wrong_teacher_leads_to_the_exact_posterior() {
     for (q, item) in [(0.0, 0), (0.0, 1), (0.0, 2), (0.1, 3), (0.1, 4), (0.1, 5)] {
         let line = line(q, 8, item);
         let exact = Exact::new(&line);
-        let found = sample(&line, &Wrong::new(&line, 2.0, 0.5), item);
+        let found = sample(&line, &wrong(&line, 2.0, 0.5), item);
         for (place, value) in [(NOW, (|s: &State| s.x) as fn(&State) -> f64), (SLOPE, |s: &State| s.slope)] {
             let (mean, variance) = exact.moments(place);
             let (m, v) = moments(&found.belief, value);
@@ -90,7 +59,7 @@ fn a_wrong_teacher_leads_to_the_exact_posterior() {
 #[test]
 fn settings_outside_their_limits_are_refused() {
     let line = line(0.0, 2, 0);
-    let teacher = Wrong::new(&line, 0.0, 1.0);
+    let teacher = wrong(&line, 0.0, 1.0);
     for config in [
         ReferenceConfig { particles: 1, ..ReferenceConfig::default() },
         ReferenceConfig { sweeps: 0, ..ReferenceConfig::default() },
