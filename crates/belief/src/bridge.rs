@@ -11,7 +11,7 @@ use crate::resample_move::{Hypothesis, normal, replay};
 use crate::{Error, Particles};
 
 /// Draws from a teacher until one is possible.
-pub(crate) const ATTEMPTS: usize = 100;
+const ATTEMPTS: usize = 100;
 /// Bisections of an exponent.
 const BISECTIONS: usize = 40;
 
@@ -169,16 +169,8 @@ impl<S: Clone + Send + Sync, T: Teacher> BridgeFilter<S, T> {
     /// Draws from a teacher, replays what it drew, and asks it about all that is remembered. Returns the transitions that it took.
     fn draw<R: Replay<State = S>>(&mut self, episode: &R, teacher: T, rng: &mut Rng) -> usize {
         let made = each(self.config.draws, rng, |_, rng| {
-            for attempts in 1..=ATTEMPTS {
-                let Some((classes, start)) = teacher.draw(rng) else { continue };
-                if episode.start(&classes, &start).is_none() {
-                    continue;
-                }
-                let count = episode.steps() * episode.step_coordinates();
-                let noise = (0..count).map(|_| normal(rng)).collect();
-                return (attempts, Some(replay(episode, (classes, start, noise), 1.0, f64::NEG_INFINITY)));
-            }
-            (ATTEMPTS, None)
+            let (attempts, found) = possible(episode, |rng| teacher.draw(rng), rng);
+            (attempts, found.map(|coordinates| replay(episode, coordinates, 1.0, f64::NEG_INFINITY)))
         });
         // Impossible draws count: that they are replaced by possible ones makes the density of these larger by as much.
         let drawn = made.iter().map(|(attempts, _)| attempts).sum();
@@ -241,6 +233,29 @@ impl<S: Clone + Send + Sync, T: Teacher> BridgeFilter<S, T> {
         report.log_evidence = if before.is_finite() { self.log_evidence - before } else { f64::NEG_INFINITY };
         Ok(())
     }
+}
+
+/// Classes and coordinates of a start, and coordinates of the noise of all steps.
+pub(crate) type Coordinates = (Vec<usize>, Vec<f64>, Vec<f64>);
+
+/// The first of [`ATTEMPTS`] draws of a start that is possible, with noise; and the attempts.
+pub(crate) fn possible<R: Replay>(
+    episode: &R,
+    draw: impl Fn(&mut Rng) -> Option<(Vec<usize>, Vec<f64>)>,
+    rng: &mut Rng,
+) -> (usize, Option<Coordinates>) {
+    for attempts in 1..=ATTEMPTS {
+        let Some((classes, start)) = draw(rng) else { continue };
+        if episode.start(&classes, &start).is_some() {
+            return (attempts, Some((classes, start, noise(episode, rng))));
+        }
+    }
+    (ATTEMPTS, None)
+}
+
+/// Coordinates of the noise of all steps.
+pub(crate) fn noise<R: Replay>(episode: &R, rng: &mut Rng) -> Vec<f64> {
+    (0..episode.steps() * episode.step_coordinates()).map(|_| normal(rng)).collect()
 }
 
 /// The largest exponent in [0, 1] at which the effective size is at least `least`; 0 where there is none.

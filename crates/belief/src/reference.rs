@@ -3,11 +3,11 @@
 use pomdp::{Replay, Rng, Teacher};
 use rand::RngExt as _;
 
-use crate::bridge::{ATTEMPTS, largest_power};
+use crate::bridge::{Coordinates, largest_power, noise, possible};
 use crate::config::{MOST_PARTICLES, require};
 use crate::diagnostics::{log_effective_sample_size, log_sum_exp};
 use crate::parallel::each;
-use crate::resample_move::{Hypothesis, Proposal, draw, normal, propose, replay, systematic};
+use crate::resample_move::{Hypothesis, Proposal, draw, propose, replay, systematic};
 use crate::{Error, Particles};
 
 /// Share of the moves that draw a start anew from the teacher, whatever the present one is.
@@ -97,14 +97,8 @@ where
     config.validate()?;
     let source = Source { episode, teacher, prior_share: config.prior_share };
     let made = each(config.particles, rng, |_, rng| {
-        for attempts in 1..=ATTEMPTS {
-            let Some((classes, start)) = source.draw(rng) else { continue };
-            if episode.start(&classes, &start).is_none() {
-                continue;
-            }
-            return (attempts, source.member((classes, start, noise(episode, rng)), f64::NEG_INFINITY));
-        }
-        (ATTEMPTS, (None, 0))
+        let (attempts, found) = possible(episode, |rng| source.draw(rng), rng);
+        (attempts, found.map_or((None, 0), |coordinates| source.member(coordinates, f64::NEG_INFINITY)))
     });
     let drawn: usize = made.iter().map(|(attempts, _)| attempts).sum();
     let mut transitions: usize = made.iter().map(|(_, (_, cost))| cost).sum();
@@ -148,11 +142,6 @@ where
     Ok(Reference { belief, log_evidence, bridges, acceptance, transitions })
 }
 
-/// Coordinates of the noise of all steps.
-fn noise<R: Replay>(episode: &R, rng: &mut Rng) -> Vec<f64> {
-    (0..episode.steps() * episode.step_coordinates()).map(|_| normal(rng)).collect()
-}
-
 /// The mixture that hypotheses are drawn from.
 struct Source<'a, R, T> {
     episode: &'a R,
@@ -175,11 +164,7 @@ impl<R: Replay, T: Teacher> Source<'_, R, T> {
     }
 
     /// The hypothesis of these coordinates, and what it cost. `None` as soon as its likelihood cannot exceed `least` any more.
-    fn member(
-        &self,
-        (classes, start, noise): (Vec<usize>, Vec<f64>, Vec<f64>),
-        least: f64,
-    ) -> (Option<Member<R::State>>, usize) {
+    fn member(&self, (classes, start, noise): Coordinates, least: f64) -> (Option<Member<R::State>>, usize) {
         let ratio = self.log_ratio(&classes, &start);
         // A broken teacher must not win.
         if !ratio.is_finite() {
