@@ -4,13 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::decision::{Decision, Verdict};
 use crate::design::{Design, Rows};
+use crate::estimate::Estimate;
 use crate::features::Catalogue;
 use crate::group::{Findings, Group, Leftover, groups, is_friction, leftover};
 use crate::kinds::{Kind, kinds};
 use crate::log::Log;
 use crate::prepared::Prepared;
 use crate::search::{Found, Search, left};
-use crate::values::{Value, covariance, values};
+use crate::values::{Value, values};
 
 /// How to diagnose.
 #[derive(Clone, Copy, Debug)]
@@ -180,7 +181,7 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
         [_, none, unknown] if unknown > none => Verdict::Unknown,
         _ => Verdict::None,
     };
-    let matrix = covariance(&prepared, &found);
+    let estimate = Estimate::new(&prepared, &found)?;
     let all: Vec<NamedEffect> = groups
         .iter()
         .map(|(probability, group)| NamedEffect {
@@ -188,7 +189,7 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
             summary: group.effect.summary,
             confidence: probability * decision.kind(&group.findings, group.effect.name, &left),
             probability: *probability,
-            joints: joints(&prepared, &found, &matrix, group, decision),
+            joints: joints(&prepared, &found, &estimate, group, decision),
         })
         .collect();
     let considered = all.iter().zip(&groups).map(|(effect, (probability, group))| Considered {
@@ -212,7 +213,7 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
         located: located(&prepared, &found),
         heldout: held_out(&prepared, &found, verdict == Verdict::Effect),
         remainder: remainder(&prepared, &found),
-        mass_uncertainty: found.mass_factor,
+        mass_uncertainty: found.mass_factors.0[0],
         notes,
         leftover: left,
         considered,
@@ -220,13 +221,7 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
     })
 }
 
-fn joints(
-    prepared: &Prepared,
-    found: &Found,
-    matrix: &nalgebra::DMatrix<f64>,
-    group: &Group,
-    decision: &Decision,
-) -> Vec<InJoint> {
+fn joints(prepared: &Prepared, found: &Found, estimate: &Estimate, group: &Group, decision: &Decision) -> Vec<InJoint> {
     let mut joints: Vec<InJoint> = group
         .terms
         .iter()
@@ -238,7 +233,7 @@ fn joints(
                 joint_name: candidate.joint.map(|joint| prepared.log.arm.joints()[joint].name.clone()),
                 log_evidence: term.gain,
                 form: candidate.effect.name,
-                parameters: wider(values(prepared, found, matrix, term), decision.wider(candidate.effect.name)),
+                parameters: wider(values(prepared, found, estimate, term), decision.wider(candidate.effect.name)),
                 kinds: kinds(prepared, found, term),
             }
         })
@@ -250,7 +245,7 @@ fn joints(
 /// Values whose intervals are wider by a factor.
 fn wider(mut values: Vec<Value>, factor: f64) -> Vec<Value> {
     for value in &mut values {
-        value.interval90 = value.interval90.map(|end| value.value + factor * (end - value.value));
+        value.interval90 = value.interval90.map(|end| (value.value + factor * (end - value.value)).max(value.least));
     }
     values
 }
@@ -325,7 +320,7 @@ fn located(prepared: &Prepared, found: &Found) -> Vec<Cell> {
 fn held_out(prepared: &Prepared, found: &Found, named: bool) -> HeldOut {
     let rows: &Rows = &found.design.held_out;
     // Re-tuned as far as is plausible: a gain that is off by 40 % is no re-tuning.
-    let null = found.null.plausible(&found.catalogue, found.mass_factor);
+    let null = found.null.plausible(&found.catalogue, &found.mass_factors);
     let fit = if named { &found.fit } else { &null };
     let gaps = [
         found.design.gap.clone(),

@@ -2,7 +2,7 @@
 //!
 //! A hypothesis that is not linear in a value, such as the speed of the Stribeck effect, stands in several settings of that value.
 
-use rayon::prelude::*;
+use arm_dynamics::PARAMETERS;
 
 use crate::effect::{EFFECTS, Effect};
 use crate::gear::{Gear, Lag, lag};
@@ -40,6 +40,10 @@ pub(crate) struct Catalogue {
     pub(crate) nuisances: Vec<usize>,
     /// Those of `nuisances` that are masses of links, whose spread is learnt.
     pub(crate) masses: Vec<usize>,
+    /// Of each link, how its numbers change by the coefficients of its ten columns of `masses`.
+    pub(crate) mass_ways: Vec<[[f64; PARAMETERS]; PARAMETERS]>,
+    /// The same of a payload.
+    pub(crate) payload_ways: Vec<[f64; PARAMETERS]>,
     pub(crate) candidates: Vec<Candidate>,
 }
 
@@ -55,22 +59,22 @@ const SPREAD: f64 = 1.5;
 const MOST_LAG_RAD: f64 = 0.5;
 
 /// Spreads of what a nominal model is wrong about although nothing is missing.
-mod nuisance {
+pub(crate) mod nuisance {
     /// Mass and inertia, relative; centre of mass, m.
-    pub(super) const MASS: f64 = 0.05;
-    pub(super) const COM_M: f64 = 0.005;
-    pub(super) const INERTIA: f64 = 0.1;
+    pub(crate) const MASS: f64 = 0.05;
+    pub(crate) const COM_M: f64 = 0.005;
+    pub(crate) const INERTIA: f64 = 0.1;
     /// Torque constants, relative, and zeros of torque, of what is usual there.
-    pub(super) const GAIN: f64 = 0.02;
-    pub(super) const OFFSET: f64 = 0.01;
+    pub(crate) const GAIN: f64 = 0.02;
+    pub(crate) const OFFSET: f64 = 0.01;
     /// Friction that the file gives, relative.
-    pub(super) const FRICTION: f64 = 0.15;
+    pub(crate) const FRICTION: f64 = 0.15;
     /// Zeros of angles, rad; clocks, s; the base's level, rad.
-    pub(super) const ANGLE_RAD: f64 = 1e-3;
-    pub(super) const CLOCK_SECS: f64 = 1e-3;
-    pub(super) const LEVEL_RAD: f64 = 2e-3;
+    pub(crate) const ANGLE_RAD: f64 = 1e-3;
+    pub(crate) const CLOCK_SECS: f64 = 1e-3;
+    pub(crate) const LEVEL_RAD: f64 = 2e-3;
     /// Gains of a servo, relative.
-    pub(super) const SERVO: f64 = 0.06;
+    pub(crate) const SERVO: f64 = 0.06;
 }
 
 impl Catalogue {
@@ -97,7 +101,7 @@ impl Catalogue {
         self.features.len() - 1
     }
 
-    fn nuisance(&mut self, joint: Option<usize>, values: Vec<f64>, stddev: f64) {
+    pub(crate) fn nuisance(&mut self, joint: Option<usize>, values: Vec<f64>, stddev: f64) {
         let place = self.push(joint, values, stddev, false);
         self.nuisances.push(place);
     }
@@ -110,39 +114,6 @@ impl Catalogue {
     pub(crate) fn shaped(&mut self, name: &str, joint: Option<usize>, shape: (f64, f64), features: Vec<usize>) {
         let effect = EFFECTS.iter().find(|effect| effect.name == name).expect("the name of an effect");
         self.candidates.push(Candidate { effect, joint, setting: shape.0, curvature: shape.1, features });
-    }
-
-    fn add_masses(&mut self, prepared: &Prepared) {
-        let count = prepared.joints();
-        let total: f64 = prepared.log.arm.masses().map(|mass| mass.mass_kg).sum();
-        let columns: Vec<Vec<Vec<f64>>> = (0..count).into_par_iter().map(|link| regressor(prepared, link)).collect();
-        for (link, mass) in prepared.log.arm.masses().enumerate() {
-            // A link without a mass in the file has one all the same.
-            let weight = mass.mass_kg.max(0.02 * total / count as f64);
-            let inertia = (mass.inertia_kgm2.trace() / 3.0).max(weight * 0.03_f64.powi(2));
-            let place = mass.centre_m();
-            for (number, values) in columns[link].iter().enumerate() {
-                let stddev = match number {
-                    0 => nuisance::MASS * weight,
-                    1..=3 => (nuisance::MASS * weight * place[number - 1]).hypot(weight * nuisance::COM_M),
-                    _ => nuisance::INERTIA * inertia,
-                };
-                self.masses.push(self.features.len());
-                self.nuisance(None, values.clone(), stddev);
-            }
-        }
-        // A payload is the last link's own columns with another prior.
-        let heavy = (0.1 * total).max(0.1);
-        let features: Vec<usize> = columns[count - 1]
-            .iter()
-            .enumerate()
-            .map(|(number, values)| match number {
-                0 => self.push(None, values.clone(), heavy, false),
-                1..=3 => self.push(None, values.clone(), heavy * 0.15, false),
-                _ => self.push(None, values.clone(), heavy * 0.01, false),
-            })
-            .collect();
-        self.candidate("payload", None, 0.0, features);
     }
 
     fn add_nuisances(&mut self, prepared: &Prepared) {
@@ -317,25 +288,6 @@ fn given(prepared: &Prepared, joint: usize) -> Vec<f64> {
 pub(crate) fn read(prepared: &Prepared, joint: usize, series: &[f64]) -> Vec<f64> {
     let gain = prepared.gain(joint);
     prepared.means(series).into_iter().map(|value| gain * value).collect()
-}
-
-/// The ten columns of a link's mass.
-fn regressor(prepared: &Prepared, link: usize) -> Vec<Vec<f64>> {
-    let (count, windows) = (prepared.joints(), prepared.windows.len());
-    let gravity = prepared.gravity_vector();
-    let mut columns = vec![vec![0.0; count * windows]; arm_dynamics::PARAMETERS];
-    for (window, ticks) in prepared.windows.iter().enumerate() {
-        for tick in ticks.clone() {
-            let [q, rate, acceleration] = prepared.state(tick);
-            let torques = prepared.log.arm.motion(&q, &rate, &acceleration, &gravity).regressor(link);
-            for (column, torques) in columns.iter_mut().zip(&torques) {
-                for joint in 0..count {
-                    column[joint * windows + window] += prepared.gain(joint) * torques[joint] / ticks.len() as f64;
-                }
-            }
-        }
-    }
-    columns
 }
 
 /// What all torques change by where the link is behind the reading of a joint by `angle` (times the coefficient), with `second` its second derivative.

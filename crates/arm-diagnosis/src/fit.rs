@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::design::{Columns, Rows};
 use crate::features::Catalogue;
-use crate::search::stddevs;
+use crate::masses::{MassFactors, stddevs};
 
 /// A fitted set of columns.
 #[derive(Clone, Debug)]
@@ -42,10 +42,10 @@ impl Fit {
     }
 
     /// The same with nuisances no further from the nominal model than three standard deviations of their priors.
-    pub(crate) fn plausible(&self, catalogue: &Catalogue, mass_factor: f64) -> Self {
+    pub(crate) fn plausible(&self, catalogue: &Catalogue, factors: &MassFactors) -> Self {
         const MOST: f64 = 3.0;
         let mut fit = self.clone();
-        let spreads = stddevs(catalogue, &self.columns, mass_factor);
+        let spreads = stddevs(catalogue, &self.columns, factors);
         for ((column, coefficient), stddev) in self.columns.iter().zip(fit.coefficients.iter_mut()).zip(spreads) {
             if catalogue.nuisances.contains(column) {
                 *coefficient = coefficient.clamp(-MOST * stddev, MOST * stddev);

@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use crate::effect::Effect;
 use crate::features::{Candidate, Feature};
 use crate::fit::Fit;
+use crate::masses::stddevs;
 use crate::prepared::{Prepared, rms};
-use crate::search::{Found, columns, stddevs};
+use crate::search::{Found, columns};
 
 /// An effect with the joints that have it.
 #[derive(Clone, Debug)]
@@ -67,9 +68,9 @@ pub(crate) fn groups(prepared: &Prepared, found: &Found) -> Option<Vec<Group>> {
             .map(|place| found.terms[place].candidate)
             .collect();
         let columns = columns(catalogue, &kept);
-        let without = Fit::new(&found.all, columns.clone(), &stddevs(catalogue, &columns, found.mass_factor))?;
+        let without = Fit::new(&found.all, columns.clone(), &stddevs(catalogue, &columns, &found.mass_factors))?;
         let form = form(found, &terms);
-        let findings = findings(prepared, found, &terms, &without.plausible(catalogue, found.mass_factor), &after);
+        let findings = findings(prepared, found, &terms, &without.plausible(catalogue, &found.mass_factors), &after);
         let findings = Findings { form_ahead: form.ahead, form_share: form.share, ..findings };
         groups.push(Group { effect: form.effect, terms, findings });
     }

@@ -4,8 +4,9 @@ use serde::Serialize;
 
 use crate::fit::Fit;
 use crate::group::is_friction;
+use crate::masses::stddevs;
 use crate::prepared::Prepared;
-use crate::search::{Found, Term, columns, left, stddevs};
+use crate::search::{Found, Term, columns, left};
 
 /// A kind of friction in a joint, with its best setting.
 #[derive(Clone, Debug, Serialize)]
@@ -41,7 +42,7 @@ pub(crate) fn kinds(prepared: &Prepared, found: &Found, term: &Term) -> Vec<Kind
     let heldout_rms_nm = |candidate: usize| -> Option<f64> {
         let chosen: Vec<usize> = others.iter().copied().chain([candidate]).collect();
         let columns = columns(&found.catalogue, &chosen);
-        let spreads = stddevs(&found.catalogue, &columns, found.mass_factor);
+        let spreads = stddevs(&found.catalogue, &columns, &found.mass_factors);
         let fit = Fit::new(&found.all, columns, &spreads)?;
         let left = left(&found.design.gap, &found.catalogue, &fit, prepared);
         let (sum, count) = found.design.chi2(&left, &found.design.held_out, joint, 1.0);

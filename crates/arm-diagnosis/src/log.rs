@@ -58,12 +58,33 @@ impl Log {
         header.check_lists(&folder.join("log.toml"), arm.joints().len())?;
         let samples = folder.join("samples.csv");
         let mut log = read_samples(&samples, header, arm)?;
+        log.leave_out_dead_torques(&samples)?;
         log.check_readings(&samples)?;
         log.unwrap_angles();
         log.drop_outliers();
         log.check(&samples)?;
         log.shorten();
         Ok(log)
+    }
+
+    /// A joint whose torque is never read, or never changes, says nothing, however exactly: its readings become missing ones. Others go on without it.
+    fn leave_out_dead_torques(&mut self, path: &Path) -> Result<(), Error> {
+        let mut left = self.torque.len();
+        for (values, joint) in self.torque.iter_mut().zip(self.arm.joints()) {
+            let mut there = values.iter().filter(|value| value.is_finite());
+            let first = there.next();
+            if there.any(|value| Some(value) != first) {
+                continue;
+            }
+            let why = if first.is_some() { "never changes" } else { "is never read" };
+            self.notes.push(format!("the torque of joint \"{}\" {why}: it is left out", joint.name));
+            values.fill(f64::NAN);
+            left -= 1;
+        }
+        if left == 0 && !self.torque.is_empty() {
+            return Err(refuse(path, "no torque of any joint changes: expected readings of at least one, in N·m"));
+        }
+        Ok(())
     }
 
     /// Single readings that stand alone against those around them become missing ones (Hampel's rule): a sensor that fails for one row says nothing.
@@ -151,7 +172,9 @@ impl Log {
         ];
         for (what, readings) in kinds {
             for (joint, values) in readings.iter().enumerate() {
-                if values.iter().filter(|value| value.is_finite()).count() < values.len() / 2 {
+                let there = values.iter().filter(|value| value.is_finite()).count();
+                let left_out = there == 0 && what == "torques";
+                if there < values.len() / 2 && !left_out {
                     return Err(refuse(path, &format!("more than half of the {what} of joint {joint} are missing")));
                 }
             }

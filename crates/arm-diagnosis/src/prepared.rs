@@ -284,6 +284,14 @@ impl<'a> Prepared<'a> {
         self.pieces = piece;
     }
 
+    /// Standard deviation that rounding of a joint's torques makes in a tick, N·m: of their smallest step.
+    fn rounding(&self, joint: usize) -> f64 {
+        let steps = self.log.torque.get(joint).into_iter().flat_map(|values| values.windows(2));
+        let step =
+            steps.map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 1e-12).fold(f64::INFINITY, f64::min);
+        if step.is_finite() { step / 12.0_f64.sqrt() / (self.ticks.rows as f64).sqrt() } else { 0.0 }
+    }
+
     /// By third differences of ticks: what is white in them is noise.
     fn estimate_noise(&mut self) {
         let long = self.windows.first().map_or(1, Range::len) as f64;
@@ -302,8 +310,8 @@ impl<'a> Prepared<'a> {
                         let squares = thirds
                             .map(|four| (four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]).powi(2) / 20.0)
                             .filter(|square| square.is_finite());
-                        // The median of the square of a normal number is 0.455.
-                        (median(squares.collect()) / 0.455).sqrt()
+                        // The median of the square of a normal number is 0.455. Where most readings repeat, the noise is what rounding hides.
+                        (median(squares.collect()) / 0.455).sqrt().max(self.rounding(joint))
                     }
                 };
                 (read / long.sqrt()).max(1e-9)

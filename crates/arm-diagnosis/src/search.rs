@@ -1,6 +1,5 @@
 //! Which hypotheses a log asks for: forward by evidence, each choice looked at again when the others stand.
 
-use arm_dynamics::{Mass, PARAMETERS};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -9,6 +8,7 @@ use crate::effect::EFFECTS;
 use crate::features::{Candidate, Catalogue};
 use crate::fit::Fit;
 use crate::group::{FINER, coefficient, is_friction};
+use crate::masses::{MassFactors, best_factors, stddevs};
 use crate::prepared::Prepared;
 
 /// Hypotheses of a model, at most.
@@ -17,9 +17,6 @@ const MOST_TERMS: usize = 16;
 const AS_GOOD: f64 = 3.0;
 /// Rounds in which each choice is looked at again.
 const ROUNDS: usize = 3;
-/// Factors by which the masses of a file may be worse than usual.
-const MASS_FACTORS: [f64; 6] = [0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
-
 /// A hypothesis that a model has, what it brings, and others that would bring nearly as much.
 #[derive(Clone, Debug)]
 pub(crate) struct Term {
@@ -37,7 +34,7 @@ pub(crate) struct Found {
     pub(crate) design: Design,
     pub(crate) all: Columns,
     pub(crate) terms: Vec<Term>,
-    pub(crate) mass_factor: f64,
+    pub(crate) mass_factors: MassFactors,
     /// The fit with all terms, and the one without any.
     pub(crate) fit: Fit,
     pub(crate) null: Fit,
@@ -48,35 +45,30 @@ pub(crate) struct Search {
     joints: usize,
     design: Design,
     all: Columns,
-    mass_factor: f64,
+    mass_factors: MassFactors,
 }
 
 impl Search {
     /// Learns what no hypothesis explains, and how good the masses are.
     pub(crate) fn new(prepared: &Prepared, catalogue: Catalogue, mut design: Design) -> Option<Self> {
         let everything = everything(&catalogue);
-        let mut factor = 4.0;
+        let mut factors = MassFactors([4.0; 3]);
         for round in 0..4 {
             let all = Columns::new(&design, &catalogue);
-            let fit_with = |factor: f64| Fit::new(&all, everything.clone(), &stddevs(&catalogue, &everything, factor));
             if round >= 2 {
-                let fits =
-                    MASS_FACTORS.par_iter().filter_map(|factor| Some((*factor, fit_with(*factor)?.log_evidence)));
-                let best = fits.collect::<Vec<_>>().into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-                factor = best.0;
+                factors = best_factors(factors, &all, &catalogue, &everything)?;
             }
-            let fit = fit_with(factor)?;
+            let fit = Fit::new(&all, everything.clone(), &stddevs(&catalogue, &everything, &factors))?;
             let left = left(&design.gap, &catalogue, &fit, prepared);
             let coefficients: Vec<(usize, f64)> =
                 fit.columns.iter().copied().zip(fit.coefficients.iter().copied()).collect();
             design.learn(&left, fit.effective(), &coulomb(prepared, &catalogue, &coefficients), prepared);
         }
         let all = Columns::new(&design, &catalogue);
-        Some(Self { catalogue, joints: prepared.joints(), design, all, mass_factor: factor })
+        Some(Self { catalogue, joints: prepared.joints(), design, all, mass_factors: factors })
     }
 
     pub(crate) fn run(self) -> Option<Found> {
-        let null = self.fit(&[])?;
         let mut chosen: Vec<usize> = Vec::new();
         for _ in 0..ROUNDS {
             let before = chosen.clone();
@@ -93,11 +85,12 @@ impl Search {
             }
         }
         let terms = self.looked_at_again(&mut chosen, true)?;
+        let null = self.fit(&[])?;
         let fit = self.fit(&chosen)?;
         Some(Found {
             catalogue: self.catalogue,
             terms,
-            mass_factor: self.mass_factor,
+            mass_factors: self.mass_factors,
             fit,
             null,
             all: self.all,
@@ -141,14 +134,14 @@ impl Search {
 
     fn fit(&self, chosen: &[usize]) -> Option<Fit> {
         let columns = columns(&self.catalogue, chosen);
-        let stddevs = stddevs(&self.catalogue, &columns, self.mass_factor);
+        let stddevs = stddevs(&self.catalogue, &columns, &self.mass_factors);
         Fit::new(&self.all, columns, &stddevs)
     }
 
     /// All hypotheses that may join some, by ln of posterior odds, best first; friction of several kinds at once in one joint at most.
     fn ranked(&self, chosen: &[usize], compound_in: Option<usize>) -> Option<Vec<(usize, f64)>> {
         let fit = self.fit(chosen)?;
-        let spreads = stddevs(&self.catalogue, &fit.columns, self.mass_factor);
+        let spreads = stddevs(&self.catalogue, &fit.columns, &self.mass_factors);
         let gain = |(place, candidate): (usize, &Candidate)| {
             let compound = candidate.effect.is_compound_friction() && candidate.joint != compound_in;
             if compound || !self.may_join(candidate, chosen) {
@@ -279,17 +272,6 @@ pub(crate) fn columns(catalogue: &Catalogue, chosen: &[usize]) -> Vec<usize> {
     columns
 }
 
-/// Prior standard deviations, those of masses times a factor.
-pub(crate) fn stddevs(catalogue: &Catalogue, columns: &[usize], mass_factor: f64) -> Vec<f64> {
-    columns
-        .iter()
-        .map(|column| {
-            let factor = if catalogue.masses.contains(column) { mass_factor } else { 1.0 };
-            catalogue.features[*column].stddev * factor
-        })
-        .collect()
-}
-
 /// Nuisances and one setting of each effect in each joint: the best description at hand, whatever is true.
 fn everything(catalogue: &Catalogue) -> Vec<usize> {
     let of = |candidate: &Candidate| {
@@ -311,24 +293,6 @@ fn everything(catalogue: &Catalogue) -> Vec<usize> {
 }
 
 impl Found {
-    /// Masses of the links as they were fitted, a payload's included, in the frames of the joints.
-    pub(crate) fn masses(&self, prepared: &Prepared) -> Vec<Mass> {
-        let last = prepared.joints() - 1;
-        let payload = self.catalogue.candidates.iter().find(|candidate| candidate.effect.name == "payload");
-        let file = prepared.log.arm.masses().enumerate();
-        let fitted = |(link, mass): (usize, &Mass)| {
-            let mut numbers = mass.numbers();
-            for (number, value) in numbers.iter_mut().enumerate() {
-                *value += coefficient(self, self.catalogue.masses[link * PARAMETERS + number]);
-                if let Some(payload) = payload.filter(|_| link == last) {
-                    *value += coefficient(self, payload.features[number]);
-                }
-            }
-            Mass::from_numbers(&numbers)
-        };
-        file.map(fitted).collect()
-    }
-
     /// Factors of torque as they were fitted.
     pub(crate) fn gains(&self, joints: usize) -> Vec<f64> {
         let gain = |joint| 1.0 + self.value(&["torque_gain", "servo_gain"], Some(joint));

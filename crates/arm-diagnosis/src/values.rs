@@ -1,14 +1,13 @@
 //! Values of the parameters of what was found, with intervals.
-//!
-//! Standard deviations are the larger of the model's own and of a sandwich over pieces (Liang and Zeger 1986), as rows of a piece err alike.
 
-use nalgebra::{DMatrix, DVector, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 
+use crate::estimate::Estimate;
 use crate::features::Candidate;
-use crate::fit::Fit;
+use crate::group::is_friction;
 use crate::prepared::Prepared;
-use crate::search::{Found, Term, stddevs};
+use crate::search::{Found, Term};
 
 /// Of a normal number, from its mean to the end of its 90 % interval, in standard deviations.
 const NINETY: f64 = 1.644_853_626_951_472_2;
@@ -24,38 +23,13 @@ pub struct Value {
     pub value: f64,
     /// From the 5 % to the 95 % quantile.
     pub interval90: [f64; 2],
-}
-
-/// Covariance of all coefficients of the fit.
-pub(crate) fn covariance(prepared: &Prepared, found: &Found) -> DMatrix<f64> {
-    let fit = &found.fit;
-    let spreads = stddevs(&found.catalogue, &fit.columns, found.mass_factor);
-    let model = fit.covariance(&spreads);
-    let sandwich = sandwich(prepared, found, fit, &model);
-    let wider =
-        DVector::from_fn(fit.columns.len(), |i, _| (sandwich[(i, i)] / model[(i, i)].max(1e-300)).max(1.0).sqrt());
-    DMatrix::from_fn(fit.columns.len(), fit.columns.len(), |i, j| model[(i, j)] * wider[i] * wider[j])
-}
-
-fn sandwich(prepared: &Prepared, found: &Found, fit: &Fit, model: &DMatrix<f64>) -> DMatrix<f64> {
-    let rows = &found.design.fitted;
-    let left = fit.left(&found.all, rows);
-    let mut scores: DMatrix<f64> = DMatrix::zeros(fit.columns.len(), prepared.pieces);
-    for (i, column) in fit.columns.iter().enumerate() {
-        let white = &found.all.white[*column];
-        let start = white.joint.map_or(0, |joint| rows.of(joint).start);
-        for (k, value) in white.values.iter().enumerate() {
-            let row = &rows.rows[start + k];
-            scores[(i, prepared.piece[row.window])] += value * left[start + k];
-        }
-    }
-    let pieces = (0..prepared.pieces).filter(|piece| scores.column(*piece).amax() > 0.0).count() as f64;
-    let outer = &scores * scores.transpose() * (pieces / (pieces - 1.0).max(1.0));
-    model * outer * model
+    /// What it cannot be less than.
+    #[serde(skip)]
+    pub least: f64,
 }
 
 /// Coefficients of a term with their covariance, those of a nuisance that is the same column added.
-fn coefficients(found: &Found, covariance: &DMatrix<f64>, features: &[usize]) -> (Vec<f64>, DMatrix<f64>) {
+fn coefficients(found: &Found, estimate: &Estimate, features: &[usize]) -> (Vec<f64>, DMatrix<f64>) {
     let fit = &found.fit;
     let places: Vec<Vec<usize>> = features
         .iter()
@@ -65,18 +39,18 @@ fn coefficients(found: &Found, covariance: &DMatrix<f64>, features: &[usize]) ->
             (0..fit.columns.len()).filter(|place| alike(&fit.columns[*place])).collect()
         })
         .collect();
-    let sum = |places: &Vec<usize>| places.iter().map(|place| fit.coefficients[*place]).sum();
+    let sum = |places: &Vec<usize>| places.iter().map(|place| estimate.mean[*place]).sum();
     let values = places.iter().map(sum).collect();
     let matrix = DMatrix::from_fn(features.len(), features.len(), |i, j| {
-        places[i].iter().flat_map(|a| places[j].iter().map(|b| covariance[(*a, *b)])).sum()
+        places[i].iter().flat_map(|a| places[j].iter().map(|b| estimate.covariance[(*a, *b)])).sum()
     });
     (values, matrix)
 }
 
 /// The parameters of a term.
-pub(crate) fn values(prepared: &Prepared, found: &Found, covariance: &DMatrix<f64>, term: &Term) -> Vec<Value> {
+pub(crate) fn values(prepared: &Prepared, found: &Found, estimate: &Estimate, term: &Term) -> Vec<Value> {
     let candidate = &found.catalogue.candidates[term.candidate];
-    let (c, matrix) = coefficients(found, covariance, &candidate.features);
+    let (c, matrix) = coefficients(found, estimate, &candidate.features);
     let known = candidate.joint.map(|joint| &prepared.log.arm.joints()[joint]);
     let (friction, damping) = known.map_or((0.0, 0.0), |joint| (joint.friction, joint.damping));
     let own = |i: usize| (c[i], matrix[(i, i)].max(0.0).sqrt());
@@ -120,12 +94,32 @@ pub(crate) fn values(prepared: &Prepared, found: &Found, covariance: &DMatrix<f6
             unit: unit(parameter.unit, slides),
             value,
             interval90: [value - NINETY * stddev, value + NINETY * stddev],
+            least: f64::NEG_INFINITY,
         })
         .collect();
+    if is_friction(candidate.effect) || candidate.effect.name == "reflected_inertia" {
+        // Their values are those of the columns, in order, and what the file says.
+        for ((value, feature), own) in values.iter_mut().zip(&candidate.features).zip(&c) {
+            if found.catalogue.features[*feature].positive {
+                value.least = value.value - own;
+                let at_zero = estimate.at_zero.iter().find(|(place, _)| found.fit.columns[*place] == *feature);
+                if let Some((_, most)) = at_zero {
+                    value.interval90[1] = value.least + most;
+                }
+                value.interval90[0] = value.interval90[0].max(value.least);
+            }
+        }
+    }
     let settings_of: [fn(&Candidate) -> f64; 2] = [|candidate| candidate.setting, |candidate| candidate.curvature];
     for (parameter, of) in candidate.effect.parameters[values.len()..].iter().zip(settings_of) {
         let unit = unit(parameter.unit, slides);
-        values.push(Value { name: parameter.name, unit, value: of(candidate), interval90: settings(found, term, of) });
+        values.push(Value {
+            name: parameter.name,
+            unit,
+            value: of(candidate),
+            interval90: settings(found, term, of),
+            least: 0.0,
+        });
     }
     values
 }
@@ -154,6 +148,7 @@ fn inverse(parameter: crate::effect::Parameter, slides: bool, value: f64, stddev
         unit: unit(parameter.unit, slides),
         value: 1.0 / value,
         interval90: [1.0 / low, 1.0 / high],
+        least: 0.0,
     }
 }
 
@@ -176,12 +171,11 @@ fn settings(found: &Found, term: &Term, of: fn(&Candidate) -> f64) -> [f64; 2] {
     [middle(low, below), middle(high, above)]
 }
 
-/// Mass and its centre in the frame of the tip, from the numbers about the last joint.
+/// Mass and its centre in the frame of the tip, from mass and moment about the tip with the axes of the last joint.
 fn payload(prepared: &Prepared, c: &[f64], matrix: &DMatrix<f64>) -> Vec<(f64, f64)> {
     let centre = |c: &[f64]| -> Vector3<f64> {
         let mass = if c[0].abs() < 1e-6 { 1e-6 } else { c[0] };
-        let place = Point3::from(Vector3::new(c[1], c[2], c[3]) / mass);
-        (prepared.log.arm.last_from_tip().inverse() * place).coords
+        prepared.log.arm.last_from_tip().rotation.inverse() * (Vector3::new(c[1], c[2], c[3]) / mass)
     };
     let at = centre(c);
     let mut all = vec![(c[0], matrix[(0, 0)].max(0.0).sqrt())];

@@ -153,6 +153,19 @@ fn friction_is_named_in_the_joints_that_have_it() {
 }
 
 #[test]
+fn friction_that_falls_with_speed_has_no_negative_damping() {
+    // Damping of −0.3 N·m·s/rad would feed the motion.
+    let friction = |rate: f64| 1.5 * rate.signum() - 0.3 * rate;
+    let diagnosis = answer(&|_, _, [_, rate, _], _| only(1, friction(rate[1])));
+    let (_, joints, _) = named(&diagnosis);
+    assert_eq!(joints, [1]);
+    for value in &diagnosis.effects[0].joints[0].parameters {
+        let [low, high] = value.interval90;
+        assert!(value.value >= 0.0 && low >= 0.0 && low <= value.value && value.value <= high, "{value:?}");
+    }
+}
+
+#[test]
 fn friction_that_the_file_overstates_is_named() {
     let folder = tempfile::tempdir().unwrap();
     write_with_file(folder.path(), &|_, _, _, _| vec![0.0; JOINTS]);
