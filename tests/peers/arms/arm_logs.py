@@ -29,7 +29,7 @@ from scene import Friction, Scene  # noqa: E402
 from simulate import Control, misfit, run_log  # noqa: E402
 
 GRAVITY = 9.81
-STREAMS = {"setup": 0, "nominal": 1, "motion": 2, "effect": 3, "readings": 4}
+STREAMS = {"setup": 0, "nominal": 1, "motion": 2, "effect": 3, "readings": 4, "rig": 5}
 
 
 def stream(seed: int, index: int, name: str, attempt: int = 0) -> np.random.Generator:
@@ -87,12 +87,38 @@ def gains(setup: dict, arm: arm_models.Arm, size: effects.Sizes) -> tuple[np.nda
     return stiffness, np.minimum(2.0 * setup["damping_ratio"] * np.sqrt(stiffness * mean), 700.0 * least)
 
 
-def simulate_log(engine_class, seed: int, index: int, effect: str | None, arm_name: str | None) -> SimpleNamespace:
+def bare_setup(setup: dict, rng: np.random.Generator) -> None:
+    """A rig of which only the maker's file is known: torques are read, and half of the arms carry a load that the file lacks."""
+    setup |= {"effect": "payload" if rng.random() < 0.5 else "none", "servo": False, "known_friction": False}
+    if setup["controller"] == "servo":
+        setup["controller"] = "gravity"
+
+
+def bare_arm(scene: Scene, size: effects.Sizes, rng: np.random.Generator) -> np.ndarray:
+    """What makers' files leave out, in all joints: friction with the Stribeck effect in half, with load in half, and motors.
+    Returns the factors by which torques are read too large."""
+    for i in range(len(scene.bodies)):
+        coulomb, viscous = effects.draw_friction(size, i, rng, 0.05, 0.3)
+        law = Friction(coulomb, viscous)
+        if rng.random() < 0.5:
+            law.peak, law.stribeck_rps = rng.uniform(0.3, 1.0) * coulomb, log_uniform(rng, 0.02, 0.2)
+        if rng.random() < 0.5:
+            law.load = law.load_back = log_uniform(rng, 0.02, 0.1)
+        scene.friction[i] = law
+        scene.armature[i] = log_uniform(rng, 0.2, 1.5) * size.inertia[i]
+    return 1.0 + rng.uniform(-0.05, 0.05, len(scene.bodies))
+
+
+def simulate_log(engine_class, seed: int, index: int, effect: str | None, arm_name: str | None,
+                 bare: bool = False) -> SimpleNamespace:
     """Draw and simulate one log; everything about it, without noise."""
     setup = draw_setup(seed, index, effect, arm_name)
+    rig = stream(seed, index, "rig")
+    if bare:
+        bare_setup(setup, rig)
     arm = arm_models.load_arm(setup["arm"])
     nominal_rng = stream(seed, index, "nominal")
-    nominal = arm_models.perturbed(arm, nominal_rng)
+    nominal = arm_models.perturbed(arm, nominal_rng, 0.15, 0.015) if bare else arm_models.perturbed(arm, nominal_rng)
     base = base_scene(arm)
     n = len(base.bodies)
     motion = draw_motion(arm, setup["motion"], stream(seed, index, "motion"))
@@ -106,6 +132,7 @@ def simulate_log(engine_class, seed: int, index: int, effect: str | None, arm_na
     size.noise = torque_noise
     known = [effects.draw_friction(size, i, nominal_rng, 0.02, 0.08) for i in range(n)]
     known = [Friction(*pair) if setup["known_friction"] else Friction() for pair in known]
+    state = rig.bit_generator.state
 
     for attempt in range(20):
         base.friction = copy.deepcopy(known)
@@ -114,6 +141,10 @@ def simulate_log(engine_class, seed: int, index: int, effect: str | None, arm_na
             base.friction[i] = Friction()
         for i, pair in drawn.in_urdf.items():
             base.friction[i] = Friction(*pair)
+        if bare:
+            rig.bit_generator.state = state
+            for joint, gain in enumerate(bare_arm(drawn.scene, size, rig)):
+                drawn.sensing.torque_gain[joint] = gain
         factor = np.ones(n)
         for i in drawn.scene.elastic:  # slower loops where a spring or a gap is in them
             factor[i] = min(1.0, 25.0 / np.sqrt(stiffness[i] / size.effective_mean[i]))
@@ -139,9 +170,10 @@ def simulate_log(engine_class, seed: int, index: int, effect: str | None, arm_na
                            torque_noise=torque_noise, drawn=drawn, tracks=tracks, servo=servo, attempts=attempt + 1)
 
 
-def make_log(engine_class, folder: str, seed: int, index: int, effect: str | None, arm_name: str | None) -> dict:
+def make_log(engine_class, folder: str, seed: int, index: int, effect: str | None, arm_name: str | None,
+             bare: bool = False) -> dict:
     """Simulate and write one log, return its entry of truth.json."""
-    log = simulate_log(engine_class, seed, index, effect, arm_name)
+    log = simulate_log(engine_class, seed, index, effect, arm_name, bare)
     setup, drawn = log.setup, log.drawn
     ratio = misfit(log.tracks, log.base, *log.servo) / log.torque_noise**2
     shown = list(range(len(ratio))) if drawn.whole_arm or not drawn.joints else drawn.joints
@@ -160,6 +192,12 @@ def make_log(engine_class, folder: str, seed: int, index: int, effect: str | Non
     entry |= {k: setup[k] for k in ("controller", "rate_hz", "known_friction", "servo", "velocity_columns",
                                     "command_columns", "noise_stated", "position_noise_rad", "velocity_noise_rps",
                                     "encoder_step_rad")}
+    if bare:
+        laws = drawn.scene.friction
+        entry |= {"rig": "bare", "coulomb_nm": short(f.coulomb for f in laws), "viscous_nmsprad": short(f.viscous for f in laws),
+                  "peak_nm": short(f.peak for f in laws), "load_share": short(f.load for f in laws),
+                  "reflected_inertia_kgm2": short(drawn.scene.armature),
+                  "torque_gain": short(drawn.sensing.torque_gain[i] for i in range(len(laws)))}
     return entry
 
 
@@ -238,6 +276,8 @@ def main() -> None:
     parser.add_argument("--logs", type=int, default=10, help="how many logs")
     parser.add_argument("--first", type=int, default=0, help="index of the first log")
     parser.add_argument("--effect", choices=["none"] + effects.INSIDE + effects.OUTSIDE, help="this effect in all logs")
+    parser.add_argument("--rig", choices=["usual", "bare"], default="usual",
+                        help="bare: real joints, of which the file says nothing, with a payload in half of the logs")
     parser.add_argument("--arm", choices=list(arm_models.CATALOGUE), help="this arm in all logs")
     options = parser.parse_args()
     engine_class = engine_of(options.engine)
@@ -249,7 +289,8 @@ def main() -> None:
             continue
         started = time.perf_counter()
         try:
-            entry = make_log(engine_class, folder, options.seed, index, options.effect, options.arm)
+            entry = make_log(engine_class, folder, options.seed, index, options.effect, options.arm,
+                             options.rig == "bare")
         except RuntimeError as error:
             print(f"{name} left out: {error}", flush=True)
             continue

@@ -233,17 +233,17 @@ def chain(arm: Arm) -> tuple[list[Body], np.ndarray, np.ndarray]:
     return bodies, place[arm.tip][1], place[arm.tip][2]
 
 
-def perturbed(arm: Arm, rng: np.random.Generator) -> Arm:
+def perturbed(arm: Arm, rng: np.random.Generator, share: float = 0.05, place_m: float = 0.005) -> Arm:
     """A nominal model: mass and second moments off by up to 5 %, centre of mass by up to 5 mm, still physical."""
     arm = copy.deepcopy(arm)
     for link in arm.links.values():
         draw = rng.uniform(-1.0, 1.0, 7)
         if link.mass <= 0.0:
             continue
-        link.mass *= 1.0 + 0.05 * draw[0]
-        link.com = link.com + 0.005 * draw[1:4] / np.sqrt(3.0)
+        link.mass *= 1.0 + share * draw[0]
+        link.com = link.com + place_m * draw[1:4] / np.sqrt(3.0)
         values, vectors = np.linalg.eigh(second_moments(link.inertia))
-        link.inertia = inertia_of(vectors @ np.diag(values * (1.0 + 0.05 * draw[4:7])) @ vectors.T)
+        link.inertia = inertia_of(vectors @ np.diag(values * (1.0 + share * draw[4:7])) @ vectors.T)
     return arm
 
 
