@@ -137,8 +137,8 @@ pub struct Diagnosis {
     pub heldout: HeldOut,
     /// What is left, by joint.
     pub remainder: Vec<Remainder>,
-    /// Factor by which masses of the file are less certain than usual.
-    pub mass_uncertainty: f64,
+    /// Factors by which masses of the file, their centres and their inertias are less certain than usual.
+    pub mass_uncertainty: [f64; 3],
     /// What was assumed about robot and log.
     pub notes: Vec<String>,
     /// What all that was found leaves.
@@ -213,7 +213,7 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
         located: located(&prepared, &found),
         heldout: held_out(&prepared, &found, verdict == Verdict::Effect),
         remainder: remainder(&prepared, &found),
-        mass_uncertainty: found.mass_factors.0[0],
+        mass_uncertainty: found.mass_factors.0,
         notes,
         leftover: left,
         considered,

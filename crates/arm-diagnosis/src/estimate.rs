@@ -30,7 +30,7 @@ impl Estimate {
         let model = found.fit.covariance(&stddevs(&found.catalogue, &found.fit.columns, &found.mass_factors));
         let sandwich = sandwich(prepared, found, &found.fit, &model);
         let wider = DVector::from_fn(count, |i, _| (sandwich[(i, i)] / model[(i, i)].max(1e-300)).max(1.0).sqrt());
-        let (kept, at_zero) = non_negative(found)?;
+        let (kept, at_zero) = non_negative(found, &wider)?;
         let (own_mean, own) = averaged(found, &kept)?;
         let mut mean = DVector::zeros(count);
         let mut covariance = DMatrix::zeros(count, count);
@@ -53,27 +53,46 @@ fn spreads(found: &Found, columns: &[usize], factors: &MassFactors) -> Vec<f64> 
     narrow.map(|(stddev, column)| stddev * found.catalogue.wider(*column)).collect()
 }
 
-/// The columns without those whose coefficient would be negative and cannot be, and these with the 95 % quantile of a normal distribution above 0.
-fn non_negative(found: &Found) -> Option<(Vec<usize>, AtZero)> {
-    let positive = |column: &usize| found.catalogue.features[*column].positive;
-    let mut kept = found.fit.columns.clone();
-    let fit = loop {
-        let fit = Fit::new(&found.all, kept.clone(), &spreads(found, &kept, &found.mass_factors))?;
-        let wrong = |(column, value): (&usize, &f64)| (positive(column) && *value < 0.0).then_some(*column);
-        let out: Vec<usize> = kept.iter().zip(fit.coefficients.iter()).filter_map(wrong).collect();
-        if out.is_empty() {
-            break fit;
+/// The columns without those whose coefficient would be negative and cannot be, and these with a 95 % quantile above 0, given that the others that are left out are 0.
+/// One leaves at a time, the most negative one, and comes back where the others that left no longer ask for it to be negative.
+fn non_negative(found: &Found, wider: &DVector<f64>) -> Option<(Vec<usize>, AtZero)> {
+    /// Steps; each set of columns explains more than the one before, so this is never reached.
+    const MOST: usize = 200;
+    let all = &found.fit.columns;
+    let positive = |column: usize| found.catalogue.features[column].positive;
+    let mut kept = all.clone();
+    for _ in 0..MOST {
+        let own = spreads(found, &kept, &found.mass_factors);
+        let fit = Fit::new(&found.all, kept.clone(), &own)?;
+        let covariance = fit.covariance(&own);
+        let distance = |place: usize| fit.coefficients[place] / covariance[(place, place)].sqrt();
+        let worst = (0..kept.len())
+            .filter(|place| positive(kept[*place]) && fit.coefficients[*place] < 0.0)
+            .min_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+        if let Some(place) = worst {
+            kept.remove(place);
+            continue;
         }
-        kept.retain(|column| !out.contains(column));
-    };
-    let own = spreads(found, &kept, &found.mass_factors);
-    let most = |column: &usize| -> Option<(usize, f64)> {
-        let spread = spreads(found, &[*column], &found.mass_factors)[0];
-        let (_, alone) = fit.gain(&found.all, &own, &[(*column, spread)])?;
-        Some((*column, above_zero(alone[0][0], alone[0][1])))
-    };
-    let at_zero = found.fit.columns.iter().filter(|column| !kept.contains(column)).filter_map(most).collect();
-    Some((kept, at_zero))
+        let mut at_zero = AtZero::new();
+        let mut back = None;
+        for (place, column) in all.iter().enumerate().filter(|(_, column)| !kept.contains(column)) {
+            let spread = spreads(found, &[*column], &found.mass_factors)[0];
+            let (_, alone) = fit.gain(&found.all, &own, &[(*column, spread)])?;
+            let [mean, stddev] = alone[0];
+            if mean > 1e-9 * spread && back.is_none_or(|(_, best)| mean / stddev > best) {
+                back = Some((*column, mean / stddev));
+            }
+            at_zero.push((*column, above_zero(mean, stddev * wider[place])));
+        }
+        match back {
+            // In the order of the fit, so that the way here leaves no trace.
+            Some((column, _)) => {
+                kept = all.iter().copied().filter(|other| *other == column || kept.contains(other)).collect();
+            }
+            None => return Some((kept, at_zero)),
+        }
+    }
+    None
 }
 
 /// 95 % quantile of a normal distribution cut off at 0.

@@ -82,7 +82,7 @@ impl Catalogue {
         let mut catalogue = Self::default();
         catalogue.add_masses(prepared);
         catalogue.add_nuisances(prepared);
-        for joint in 0..prepared.joints() {
+        for joint in (0..prepared.joints()).filter(|joint| prepared.is_read(*joint)) {
             catalogue.add_friction(prepared, joint);
             catalogue.add_motor(prepared, joint);
             catalogue.add_gear(prepared, joint);

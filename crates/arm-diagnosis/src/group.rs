@@ -178,6 +178,7 @@ fn findings(prepared: &Prepared, found: &Found, terms: &[usize], without: &Fit, 
     } else {
         terms.iter().filter_map(|place| chosen(place).joint).collect()
     };
+    let joints: Vec<usize> = joints.into_iter().filter(|joint| prepared.is_read(*joint)).collect();
     // In units of each joint's own variance, so that strong joints do not hide weak ones.
     let sum =
         |left: &Left| joints.iter().map(|joint| left.squares[*joint] / before.squares[*joint].max(1e-300)).sum::<f64>();

@@ -70,8 +70,9 @@ impl Catalogue {
     /// A payload near the tip, of several sizes: one prior for all would make a light one pay for what a heavy one may do.
     fn add_payload(&mut self, prepared: &Prepared, columns: &[Vec<f64>], total: f64) {
         self.payload_ways = payload_ways(prepared.log.arm.last_from_tip().translation.vector);
-        for share in PAYLOAD_SHARES {
-            let heavy = (share * total).max(0.02);
+        let mut sizes = PAYLOAD_SHARES.map(|share| (share * total).max(0.02)).to_vec();
+        sizes.dedup();
+        for heavy in sizes {
             let mut features = Vec::new();
             for (way, numbers) in self.payload_ways.clone().iter().enumerate() {
                 let stddev = match way {
@@ -188,11 +189,9 @@ fn moved(centre: &Vector3<f64>, axis: usize, mass_kg: f64) -> [f64; PARAMETERS] 
 fn mass_ways(mass: &Mass, weight: f64) -> [[f64; PARAMETERS]; PARAMETERS] {
     let mut ways = [[0.0; PARAMETERS]; PARAMETERS];
     let numbers = mass.numbers();
-    if mass.mass_kg > 0.0 {
-        ways[0] = numbers.map(|number| number / mass.mass_kg);
-    } else {
-        ways[0][0] = 1.0;
-    }
+    ways[0] = numbers.map(|number| number / mass.mass_kg.max(weight));
+    // A link that weighs next to nothing in the file may weigh something all the same, as a point.
+    ways[0][0] = 1.0;
     for axis in 0..3 {
         ways[1 + axis] = moved(&mass.centre_m(), axis, weight);
     }

@@ -146,6 +146,11 @@ impl<'a> Prepared<'a> {
             && self.motion.iter().any(|joint| rms(&joint.rate) > 2.0 * STANDS_RPS.max(joint.rate_stddev))
     }
 
+    /// Whether there are torques of a joint to compare with.
+    pub(crate) fn is_read(&self, joint: usize) -> bool {
+        self.measured[joint].iter().any(|torque| torque.is_finite())
+    }
+
     pub(crate) fn joints(&self) -> usize {
         self.log.joints()
     }
@@ -284,12 +289,20 @@ impl<'a> Prepared<'a> {
         self.pieces = piece;
     }
 
-    /// Standard deviation that rounding of a joint's torques makes in a tick, N·m: of their smallest step.
+    /// Standard deviation that rounding of a joint's torques makes in the mean of a window, N·m. Readings that repeat have the same error, so a mean is as good as its
+    /// different readings make it.
     fn rounding(&self, joint: usize) -> f64 {
-        let steps = self.log.torque.get(joint).into_iter().flat_map(|values| values.windows(2));
-        let step =
-            steps.map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 1e-12).fold(f64::INFINITY, f64::min);
-        if step.is_finite() { step / 12.0_f64.sqrt() / (self.ticks.rows as f64).sqrt() } else { 0.0 }
+        /// Share of the steps that are smaller than the one that is taken: a stray one is not the sensor's.
+        const STRAY: f64 = 0.02;
+        let Some(values) = self.log.torque.get(joint) else { return 0.0 };
+        let pairs = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| step.is_finite());
+        let all = pairs.clone().count().max(1) as f64;
+        let mut steps: Vec<f64> = pairs.filter(|step| *step > 1e-12).collect();
+        steps.sort_by(f64::total_cmp);
+        let Some(step) = steps.get((STRAY * steps.len() as f64) as usize) else { return 0.0 };
+        let rows = (self.windows.first().map_or(1, Range::len) * self.ticks.rows) as f64;
+        let different = (rows * steps.len() as f64 / all).max(1.0);
+        step / 12.0_f64.sqrt() / different.sqrt()
     }
 
     /// By third differences of ticks: what is white in them is noise.
@@ -310,11 +323,11 @@ impl<'a> Prepared<'a> {
                         let squares = thirds
                             .map(|four| (four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]).powi(2) / 20.0)
                             .filter(|square| square.is_finite());
-                        // The median of the square of a normal number is 0.455. Where most readings repeat, the noise is what rounding hides.
-                        (median(squares.collect()) / 0.455).sqrt().max(self.rounding(joint))
+                        // The median of the square of a normal number is 0.455.
+                        (median(squares.collect()) / 0.455).sqrt()
                     }
                 };
-                (read / long.sqrt()).max(1e-9)
+                (read / long.sqrt()).max(self.rounding(joint)).max(1e-9)
             })
             .collect();
     }

@@ -86,11 +86,10 @@ impl<'a> Report<'a> {
             heldout.after,
             (1e3 * heldout.closed_fraction).floor() / 10.0
         ));
-        if diagnosis.mass_uncertainty > 1.5 {
-            lines.push(format!(
-                "  the masses of the robot's file are {:.0} times less certain than usual",
-                diagnosis.mass_uncertainty
-            ));
+        for (what, factor) in ["masses", "centres of mass", "inertias"].iter().zip(diagnosis.mass_uncertainty) {
+            if factor > 1.5 {
+                lines.push(format!("  the {what} of the robot's file are {factor:.0} times less certain than usual"));
+            }
         }
         lines.extend(diagnosis.notes.iter().map(|note| format!("  assumed: {note}")));
         lines.push(format!("  next experiment: {}", self.next_experiment));

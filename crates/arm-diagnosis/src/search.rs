@@ -17,6 +17,7 @@ const MOST_TERMS: usize = 16;
 const AS_GOOD: f64 = 3.0;
 /// Rounds in which each choice is looked at again.
 const ROUNDS: usize = 3;
+
 /// A hypothesis that a model has, what it brings, and others that would bring nearly as much.
 #[derive(Clone, Debug)]
 pub(crate) struct Term {

@@ -21,7 +21,7 @@ pub struct Value {
     pub unit: &'static str,
     /// Best value.
     pub value: f64,
-    /// From the 5 % to the 95 % quantile.
+    /// From the 5 % to the 95 % quantile; of a value at its least, from there to the 95 % quantile.
     pub interval90: [f64; 2],
     /// What it cannot be less than.
     #[serde(skip)]
@@ -79,7 +79,9 @@ pub(crate) fn values(prepared: &Prepared, found: &Found, estimate: &Estimate, te
             vec![(1.0 / scale, own(0).1 / (scale * scale))]
         }
         "joint_elasticity" => {
-            let give = c[0].max(1e-12);
+            // Where it is at 0, as soft as may be.
+            let at_zero = estimate.at_zero.iter().find(|(place, _)| found.fit.columns[*place] == candidate.features[0]);
+            let give = at_zero.map_or(c[0], |(_, most)| *most).max(1e-12);
             return vec![inverse(candidate.effect.parameters[0], slides, give, own(0).1)];
         }
         "torque_saturation" | "command_delay" => Vec::new(),
@@ -99,15 +101,14 @@ pub(crate) fn values(prepared: &Prepared, found: &Found, estimate: &Estimate, te
         .collect();
     if is_friction(candidate.effect) || candidate.effect.name == "reflected_inertia" {
         // Their values are those of the columns, in order, and what the file says.
-        for ((value, feature), own) in values.iter_mut().zip(&candidate.features).zip(&c) {
-            if found.catalogue.features[*feature].positive {
-                value.least = value.value - own;
-                let at_zero = estimate.at_zero.iter().find(|(place, _)| found.fit.columns[*place] == *feature);
-                if let Some((_, most)) = at_zero {
-                    value.interval90[1] = value.least + most;
-                }
-                value.interval90[0] = value.interval90[0].max(value.least);
+        for (value, feature) in values.iter_mut().zip(&candidate.features) {
+            value.least = 0.0;
+            let at_zero = estimate.at_zero.iter().find(|(place, _)| found.fit.columns[*place] == *feature);
+            if let Some((_, most)) = at_zero {
+                value.interval90[1] = value.value + most;
             }
+            value.value = value.value.max(0.0);
+            value.interval90 = value.interval90.map(|end| end.max(0.0));
         }
     }
     let settings_of: [fn(&Candidate) -> f64; 2] = [|candidate| candidate.setting, |candidate| candidate.curvature];

@@ -41,6 +41,7 @@ fn a_joint_whose_torque_is_dead_is_left_out_and_the_others_are_diagnosed() {
         let log = read(|name, value| if name == "joint_torque_3_nm" { dead.into() } else { value.to_string() });
         let diagnosis = diagnose(&log.unwrap(), &Settings::default()).unwrap();
         assert_eq!(joints(&diagnosis), [1]);
+        assert!(diagnosis.considered.iter().all(|one| !one.joints.contains(&3)), "{:?}", diagnosis.considered);
         assert!(diagnosis.notes.iter().any(|note| note.contains("\"joint3\"") && note.contains(why)), "{why}");
         assert!(diagnosis.heldout.after < 10.0, "{:?}", diagnosis.heldout);
     }
