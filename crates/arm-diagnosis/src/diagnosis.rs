@@ -204,6 +204,7 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
     if !log.unread.is_empty() {
         notes.push(format!("columns that nothing reads: {}", log.unread.join(", ")));
     }
+    notes.extend((0..prepared.joints()).filter_map(|joint| inverted(&prepared, joint)));
     Some(Diagnosis {
         verdict,
         probabilities,
@@ -218,6 +219,24 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
         leftover: left,
         considered,
         curves: curves(&prepared, &found),
+    })
+}
+
+/// A sentence where a joint's torques look like those of the file with the other sign.
+fn inverted(prepared: &Prepared, joint: usize) -> Option<String> {
+    /// Correlation from which that is said: friction alone does not make it.
+    const CLEARLY: f64 = -0.7;
+    let pairs = prepared.measured[joint].iter().zip(&prepared.nominal[joint]).filter(|(read, _)| read.is_finite());
+    let [mut product, mut read_square, mut own_square] = [0.0; 3];
+    for (read, own) in pairs {
+        product += read * own;
+        read_square += read * read;
+        own_square += own * own;
+    }
+    let correlation = product / (read_square * own_square).sqrt().max(1e-300);
+    (correlation < CLEARLY).then(|| {
+        let name = &prepared.log.arm.joints()[joint].name;
+        format!("torques of joint \"{name}\" are taken as they stand, but look like the file's with the other sign")
     })
 }
 

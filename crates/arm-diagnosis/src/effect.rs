@@ -212,7 +212,7 @@ impl Effect {
             ("backlash", "stiffness") => "turns by up to about 0.005 rad under the usual torque",
             (_, "stiffness") => "turns by up to about 0.1 rad under the usual torque",
             (_, "play") => "up to about 0.05",
-            (_, "mass") => "within about 10 % of the arm's",
+            (_, "mass") => "up to the arm's own, either way",
             (_, "com_x" | "com_y" | "com_z") => "within about 0.15",
             (_, "slope_x" | "slope_y") => "within about 0.05",
             (_, "share") => "up to about 0.7",

@@ -193,12 +193,12 @@ impl Log {
         let stated = self.header.period_secs;
         if !(step > stated / 3.0 && step < stated * 3.0) {
             let problem = format!(
-                "rows are {step} apart in the median, period_secs of log.toml is {stated}: expected seconds in both"
+                "rows are {step:.6} apart in the median, period_secs of log.toml is {stated}: expected seconds in both"
             );
             return Err(refuse(path, &problem));
         }
-        if step > 0.05 {
-            return Err(refuse(path, &format!("rows are {step} s apart, expected at least 20 rows a second")));
+        if step > 0.0501 {
+            return Err(refuse(path, &format!("rows are {step:.4} s apart, expected at least 20 rows a second")));
         }
         for (joint, velocities) in self.velocity.iter().enumerate() {
             let (mut product, mut square, mut count) = (0.0, 0.0, 0);

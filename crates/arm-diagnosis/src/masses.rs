@@ -11,8 +11,8 @@ use crate::group::coefficient;
 use crate::prepared::Prepared;
 use crate::search::Found;
 
-/// Usual masses of a payload, of the arm's, and how far from the tip its centre usually is, m.
-const PAYLOAD_SHARES: [f64; 3] = [0.01, 0.03, 0.1];
+/// Sizes of a payload's prior, of the arm's mass, and how far from the tip its centre usually is, m.
+const PAYLOAD_SHARES: [f64; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 const PAYLOAD_M: f64 = 0.07;
 
 /// Factors by which the masses of a file may be worse than usual, and what is plausible of their logarithms to base 2: a standard deviation about 0.

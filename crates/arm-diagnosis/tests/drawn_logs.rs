@@ -258,17 +258,20 @@ fn an_elastic_gear_explains_most_in_its_joint() {
 
 #[test]
 fn what_the_whole_arm_has_is_named() {
-    // 1.5 kg, 5 cm beyond the flange.
-    let payload = Mass::about_centre(1.5, Vector3::new(0.0, 0.0, 0.05), Matrix3::identity() * 1e-3);
-    let loaded = answer(&|arm, _, [q, rate, acceleration], own| {
-        let mut masses: Vec<Mass> = arm.masses().copied().collect();
-        masses[JOINTS - 1] = masses[JOINTS - 1].joined(&payload.moved(arm.last_from_tip()));
-        let torques = arm.with_masses(&masses).inverse_dynamics(q, rate, acceleration, &GRAVITY);
-        torques.iter().zip(own).map(|(with, without)| with - without).collect()
-    });
-    let (name, _, values) = named(&loaded);
-    assert_eq!(name, "payload");
-    near(values[0], 1.5, 0.1);
+    // 5 cm beyond the flange; half as heavy as the whole arm; and a hand of the file that is not there.
+    let whole: f64 = arm().masses().map(|mass| mass.mass_kg).sum();
+    for mass_kg in [1.5, 0.5 * whole, -1.5] {
+        let payload = Mass::about_centre(mass_kg, Vector3::new(0.0, 0.0, 0.05), Matrix3::identity() * (7e-4 * mass_kg));
+        let loaded = answer(&|arm, _, [q, rate, acceleration], own| {
+            let mut masses: Vec<Mass> = arm.masses().copied().collect();
+            masses[JOINTS - 1] = masses[JOINTS - 1].joined(&payload.moved(arm.last_from_tip()));
+            let torques = arm.with_masses(&masses).inverse_dynamics(q, rate, acceleration, &GRAVITY);
+            torques.iter().zip(own).map(|(with, without)| with - without).collect()
+        });
+        let (name, _, values) = named(&loaded);
+        assert_eq!(name, "payload");
+        near(values[0], mass_kg, 0.1);
+    }
     let tilted = answer(&|arm, _, [q, rate, acceleration], own| {
         let torques = arm.inverse_dynamics(q, rate, acceleration, &(GRAVITY + Vector3::new(0.5, 0.0, 0.0)));
         torques.iter().zip(own).map(|(with, without)| with - without).collect()

@@ -1,10 +1,11 @@
 //! The chain of an arm: which joints move, which are locked, and what each carries.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{IsometryMatrix3, Rotation3, Translation3, Unit, UnitVector3, Vector3};
-use urdf_file::{Joint, JointKind, Origin, Urdf, joint_error, link_error};
+use urdf_file::{Joint, JointKind, Limit, Origin, Urdf, joint_error, link_error};
 
 use crate::arm::{ArmError, ArmJoint};
 use crate::mass::Mass;
@@ -142,8 +143,16 @@ pub(crate) fn joint_of(joint: &Joint, path: &Path) -> Result<ArmJoint, ArmError>
         _ if joint.limit.lower == 0.0 && joint.limit.upper == 0.0 => (f64::NEG_INFINITY, f64::INFINITY),
         _ => (joint.limit.lower, joint.limit.upper),
     };
-    if !(lower < upper && joint.limit.velocity >= 0.0 && joint.limit.effort >= 0.0) {
-        let problem = format!("limit is {lower} to {upper}, expected lower below upper");
+    let Limit { velocity, effort, .. } = joint.limit;
+    // What is no number is not in order either.
+    let problem = if lower.partial_cmp(&upper) != Some(Ordering::Less) {
+        Some(format!("limit is {lower} to {upper}, expected lower below upper"))
+    } else {
+        let mut rates = [("velocity", velocity), ("effort", effort)].into_iter();
+        let wrong = |(_, value): &(&str, f64)| value.is_nan() || *value < 0.0;
+        rates.find(wrong).map(|(what, value)| format!("limit of {what} is {value}, expected a number of at least 0"))
+    };
+    if let Some(problem) = problem {
         return Err(joint_error(path, &joint.name, &problem).into());
     }
     let dynamics = joint.dynamics;

@@ -90,6 +90,15 @@ fn the_longest_chain_is_the_arm_and_what_cannot_be_one_is_refused_in_a_sentence(
     let circle = robot(&[link("a"), link("b"), joint("one", "fixed", "a", "b"), joint("two", "fixed", "b", "a")]);
     assert!(refused(&circle, &Selection::default()).contains("loop"));
     assert!(refused("<robot name=\"r\"/>", &Selection::default()).contains("no links"));
+    for (limit, expected) in [
+        ("lower=\"1\" upper=\"-1\"", "limit is 1 to -1, expected lower below upper"),
+        ("lower=\"-1\" upper=\"1\" velocity=\"-2\"", "limit of velocity is -2, expected a number of at least 0"),
+        ("lower=\"-1\" upper=\"1\" velocity=\"1\" effort=\"-2\"", "limit of effort is -2, expected a number"),
+    ] {
+        let limited = joint("one", "revolute", "a", "b").replace("</joint>", &format!("<limit {limit}/></joint>"));
+        let message = refused(&robot(&[link("a"), link("b"), limited]), &Selection::default());
+        assert!(message.contains(expected), "{message}");
+    }
     let tip = Selection { joints: Some(vec!["left".into()]), tip: Some("c".into()) };
     assert!(refused(&two, &tip).contains("tip_link = \"c\": expected a link that moves with \"left\""));
 }
