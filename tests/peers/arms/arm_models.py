@@ -234,7 +234,7 @@ def chain(arm: Arm) -> tuple[list[Body], np.ndarray, np.ndarray]:
 
 
 def perturbed(arm: Arm, rng: np.random.Generator, share: float = 0.05, place_m: float = 0.005) -> Arm:
-    """A nominal model: mass and second moments off by up to 5 %, centre of mass by up to 5 mm, still physical."""
+    """A nominal model: mass and second moments off by up to `share`, centre of mass by up to `place_m`, still physical."""
     arm = copy.deepcopy(arm)
     for link in arm.links.values():
         draw = rng.uniform(-1.0, 1.0, 7)

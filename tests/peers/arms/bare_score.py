@@ -34,6 +34,8 @@ def main() -> None:
     parser.add_argument("folders", nargs="+")
     parser.add_argument("--list", action="store_true", help="a line for each log")
     options = parser.parse_args()
+    if len(options.folders) % 2:
+        parser.error("expected LOGS and ANSWERS in pairs")
     rows = []
     for logs, answers in zip(options.folders[::2], options.folders[1::2]):
         truth = json.load(open(os.path.join(logs, "truth.json"), encoding="utf-8"))
@@ -58,13 +60,15 @@ def main() -> None:
             row["true"], row["others"] = entry["parameters"].get("mass_kg"), sorted(
                 name for name in row["effects"] if "friction" not in name and name not in THERE)
             rows.append(row)
+    if not rows:
+        parser.error("no answers in these folders")
     if options.list:
         for row in rows:
             load = f"{row['true']:.2f} kg" if row["payload"] else "no load"
             found = f"{100 * row['error']:+.0f} % {'in' if row['holds'] else 'OUT'}" if "error" in row else "named" if row["named"] else ""
             held = row["report"]["heldout"]
             print(f"{row['name']} {row['arm']:6s} {load:8s} {found:12s} friction {row['friction'][0]}/{row['friction'][1]} "
-                  f"held out {held['before']:.3g} to {held['after']:.3g} masses x{row['report']['mass_uncertainty']:g} others {row['others']}")
+                  f"held out {held['before']:.3g} to {held['after']:.3g} masses x{row['report']['mass_uncertainty']} others {row['others']}")
     loaded, empty = [r for r in rows if r["payload"]], [r for r in rows if not r["payload"]]
     found = [r for r in loaded if r["named"]]
     print("| | |\n|---|---|")
