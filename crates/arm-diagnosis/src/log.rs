@@ -108,8 +108,9 @@ impl Log {
                 let mut middles = Vec::with_capacity(values.len());
                 for span in &spans {
                     for row in span.clone() {
-                        let (first, last) =
-                            (row.saturating_sub(BESIDE).max(span.start), (row + BESIDE + 1).min(span.end));
+                        // As far on one side as on the other: a motion goes on, and the median of what comes after the first row is none of it.
+                        let beside = BESIDE.min(row - span.start).min(span.end - 1 - row);
+                        let (first, last) = (row - beside, row + beside + 1);
                         middles.push(median(
                             values[first..last].iter().copied().filter(|value| value.is_finite()).collect(),
                         ));

@@ -37,7 +37,8 @@ impl Ticks {
             episodes.push(episodes[episodes.len() - 1] + group.len());
         }
         let mean = |values: &Vec<f64>| -> Vec<f64> {
-            groups.iter().flatten().map(|range| mean(&values[range.clone()])).collect()
+            let filled = filled(log, values);
+            groups.iter().flatten().map(|range| mean(&values[range.clone()], &filled[range.clone()])).collect()
         };
         let all = |readings: &Readings| readings.iter().map(&mean).collect();
         Self {
@@ -60,8 +61,49 @@ impl Ticks {
     }
 }
 
-/// Of what is there; NaN where nothing is.
-fn mean(values: &[f64]) -> f64 {
+/// Of a tick's readings; NaN where none is there. Where some are missing, the mean of those that are there would be that of another instant: what stands on the
+/// line between their neighbours stands in, but at the ends of an episode.
+fn mean(values: &[f64], filled: &[f64]) -> f64 {
     let there = values.iter().filter(|value| value.is_finite());
-    there.clone().sum::<f64>() / there.count() as f64
+    let count = there.clone().count();
+    match filled.iter().sum::<f64>() / filled.len() as f64 {
+        mean if count > 0 && mean.is_finite() => mean,
+        _ => there.sum::<f64>() / count as f64,
+    }
+}
+
+/// Readings with those that are missing on the line between their neighbours in the same episode; at its ends they stay missing.
+fn filled(log: &Log, values: &[f64]) -> Vec<f64> {
+    let mut all = values.to_vec();
+    for span in log.rows() {
+        let mut before: Option<usize> = None;
+        for row in span {
+            if values[row].is_nan() {
+                continue;
+            }
+            if let Some(last) = before {
+                let slope = (values[row] - values[last]) / (log.time_secs[row] - log.time_secs[last]);
+                let missing = last + 1..row;
+                for (value, time) in all[missing.clone()].iter_mut().zip(&log.time_secs[missing]) {
+                    *value = values[last] + slope * (time - log.time_secs[last]);
+                }
+            }
+            before = Some(row);
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mean;
+
+    #[test]
+    fn a_reading_that_is_missing_does_not_move_a_tick() {
+        // A joint at 1 rad/s, rows of 1 ms; the last reading of the tick is missing.
+        let (values, filled) = ([0.0, 0.001, 0.002, f64::NAN], [0.0, 0.001, 0.002, 0.003]);
+        assert!((mean(&values, &filled) - 0.0015).abs() < 1e-15);
+        assert_eq!(mean(&values, &values), 0.001);
+        assert!(mean(&[f64::NAN; 4], &filled).is_nan());
+    }
 }
