@@ -11,21 +11,24 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import statistics
+import sys
+
+from common import read_truth
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
+from mujoco_score import wilson  # noqa: E402
 
 
 THERE = ("presliding", "reflected_inertia", "payload", "torque_gain")
 
 
-def wilson(right: int, of: int) -> str:
-    """Share with its 95 % interval."""
+def share(right: int, of: int) -> str:
+    """A count with its 95 % interval."""
     if not of:
         return "–"
-    z, p = 1.96, right / of
-    middle, half = p + z * z / (2 * of), z * math.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
-    low, high = (middle - half) / (1 + z * z / of), (middle + half) / (1 + z * z / of)
+    low, high = wilson(right, of)
     return f"{right} of {of} ({100 * low:.0f} to {100 * high:.0f} %)"
 
 
@@ -38,12 +41,12 @@ def main() -> None:
         parser.error("expected LOGS and ANSWERS in pairs")
     rows = []
     for logs, answers in zip(options.folders[::2], options.folders[1::2]):
-        truth = json.load(open(os.path.join(logs, "truth.json"), encoding="utf-8"))
-        for name, entry in sorted(truth.items()):
+        for name, entry in sorted(read_truth(logs).items()):
             path = os.path.join(answers, name, "report.json")
             if not os.path.exists(path):
                 continue
-            report = json.load(open(path, encoding="utf-8"))
+            with open(path, encoding="utf-8") as file:
+                report = json.load(file)
             row = {"name": name, "arm": entry["arm"], "payload": entry["effect"] == "payload", "report": report}
             row["effects"] = {}
             for effect in report["effects"]:
@@ -72,15 +75,15 @@ def main() -> None:
     loaded, empty = [r for r in rows if r["payload"]], [r for r in rows if not r["payload"]]
     found = [r for r in loaded if r["named"]]
     print("| | |\n|---|---|")
-    print(f"| payload named where there is one | {wilson(len(found), len(loaded))} |")
-    print(f"| payload named where there is none | {wilson(sum(r['named'] for r in empty), len(empty))} |")
-    print(f"| error of its mass at most 10 % | {wilson(sum(abs(r['error']) <= 0.1 for r in found), len(loaded))} |")
+    print(f"| payload named where there is one | {share(len(found), len(loaded))} |")
+    print(f"| payload named where there is none | {share(sum(r['named'] for r in empty), len(empty))} |")
+    print(f"| error of its mass at most 10 % | {share(sum(abs(r['error']) <= 0.1 for r in found), len(loaded))} |")
     if found:
         print(f"| median error of its mass | {100 * statistics.median(abs(r['error']) for r in found):.1f} % |")
-    print(f"| 90 % interval holds its mass | {wilson(sum(r['holds'] for r in found), len(found))} |")
-    print(f"| joints with friction that are named | {wilson(sum(r['friction'][0] for r in rows), sum(r['friction'][1] for r in rows))} |")
-    print(f"| motors' inertia named | {wilson(sum('reflected_inertia' in r['effects'] for r in rows), len(rows))} |")
-    print(f"| logs with an effect that is not there | {wilson(sum(bool(r['others']) for r in rows), len(rows))} |")
+    print(f"| 90 % interval holds its mass | {share(sum(r['holds'] for r in found), len(found))} |")
+    print(f"| joints with friction that are named | {share(sum(r['friction'][0] for r in rows), sum(r['friction'][1] for r in rows))} |")
+    print(f"| motors' inertia named | {share(sum('reflected_inertia' in r['effects'] for r in rows), len(rows))} |")
+    print(f"| logs with an effect that is not there | {share(sum(bool(r['others']) for r in rows), len(rows))} |")
     closed = [r["report"]["heldout"]["closed_fraction"] for r in rows]
     print(f"| median share of the held-out error that is gone | {100 * statistics.median(closed):.0f} % |")
 

@@ -20,6 +20,7 @@ import numpy as np  # noqa: E402
 import pinocchio  # noqa: E402
 
 import arm_models  # noqa: E402
+from common import read_truth, write_truth  # noqa: E402
 
 LOADS_KG = [None, 0.3, 1.0, 2.0, 4.0, -1.0]
 RATE_HZ, SECS = 200, 30.0
@@ -100,8 +101,7 @@ def make(folder: str, name: str, load_kg: float | None, rng: np.random.Generator
 
 
 def score(logs: str, answers: str) -> None:
-    with open(os.path.join(logs, "truth.json"), encoding="utf-8") as file:
-        truth = json.load(file)
+    truth = read_truth(logs)
     counts: dict = {}
     friction = [0, 0, 0]
     for name, entry in sorted(truth.items()):
@@ -149,8 +149,7 @@ def main() -> None:
         for k, load in enumerate(LOADS_KG):
             log = f"{name}-{'none' if load is None else load}"
             truth[log] = make(os.path.join(options.out, log), name, load, np.random.default_rng([options.seed, i, k]))
-    with open(os.path.join(options.out, "truth.json"), "w", encoding="utf-8") as file:
-        json.dump(truth, file, indent=1)
+    write_truth(options.out, truth)
 
 
 if __name__ == "__main__":
