@@ -201,8 +201,7 @@ pub(crate) fn leftover(prepared: &Prepared, found: &Found) -> Leftover {
     let most = |of: &dyn Fn(usize) -> f64| (0..prepared.joints()).map(of).fold(0.0, f64::max);
     let mean = |joint: usize| after.squares[joint] / after.rows[joint].max(1) as f64;
     Leftover {
-        // Noise that rounds to nothing would make anything large.
-        after: most(&|joint| mean(joint) / prepared.noise[joint].max(1e-4 * prepared.scale[joint]).powi(2)),
+        after: most(&|joint| mean(joint) / prepared.noise[joint].powi(2)),
         left: most(&|joint| mean(joint).sqrt() / prepared.scale[joint]),
         foretold: most(&|joint| found.design.foretold(&after.all, joint, prepared)),
     }

@@ -113,9 +113,9 @@ impl<'a> Prepared<'a> {
         prepared.nominal.clone_from(&prepared.rigid);
         prepared.measure();
         prepared.cut();
-        prepared.estimate_noise();
         let most = prepared.measured.iter().map(|values| rms(values)).fold(0.0, f64::max);
         prepared.scale = prepared.measured.iter().map(|values| rms(values).max(0.01 * most).max(1e-6)).collect();
+        prepared.estimate_noise();
         prepared
     }
 
@@ -307,13 +307,15 @@ impl<'a> Prepared<'a> {
 
     /// By third differences of ticks: what is white in them is noise.
     fn estimate_noise(&mut self) {
+        /// Of a joint's typical torque: simulators have no noise, but no sensor and no model is better than that.
+        const LEAST: f64 = 1e-3;
         let long = self.windows.first().map_or(1, Range::len) as f64;
         self.noise = (0..self.joints())
             .map(|joint| {
                 if let Some(servo) = self.log.header.servo.as_ref().filter(|_| self.servo_damping.is_some()) {
                     // The error of position is read with the noise of positions.
                     return (servo.stiffness_nmprad.of(joint).unwrap_or(0.0) * self.motion[joint].noise / long.sqrt())
-                        .max(1e-9);
+                        .max(LEAST * self.scale[joint]);
                 }
                 let given = self.log.header.noise.joint_torque_nm.as_ref().and_then(|numbers| numbers.of(joint));
                 let read = match given {
@@ -327,7 +329,7 @@ impl<'a> Prepared<'a> {
                         (median(squares.collect()) / 0.455).sqrt()
                     }
                 };
-                (read / long.sqrt()).max(self.rounding(joint)).max(1e-9)
+                (read / long.sqrt()).max(self.rounding(joint)).max(LEAST * self.scale[joint])
             })
             .collect();
     }
