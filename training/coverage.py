@@ -1,0 +1,97 @@
+"""How often the intervals of a posterior network hold the truth, on episodes that it was not trained on.
+
+    python3 training/coverage.py assets/priors/sawyer-fixed runs/starts/sawyer-fixed-33
+
+The network's density is autoregressive, so that its distribution function of each true coordinate, given the readings and the true coordinates
+before it, is uniform if it is calibrated (the probability integral transform; Rosenblatt 1952). For each coordinate and some steps the table has the share
+in [0.05, 0.95], and the standard deviation of the same in normal coordinates: 0.90 and 1 are right, a larger deviation is a network that is too sure.
+"""
+
+import argparse
+import json
+import os
+import struct
+
+import numpy as np
+import torch
+from torch.nn import functional as F
+
+import posterior
+from posterior import AWAKE, COORDINATES, PAIRS
+
+NAMES = ["mass", "friction", "centre of mass x", "centre of mass y", "centre of mass z", "size 0", "size 1", "size 2", "x", "y", "yaw"]
+NAMES += [f"obstacle's {name}" for name in ("mass", "size 0", "size 1", "size 2", "x", "y", "yaw")]
+STEPS = (0, 4, 9, 14, 24)
+
+
+def read(folder):
+    """The network of a folder that `posterior.write` has written."""
+    with open(os.path.join(folder, "posterior.json")) as file:
+        about = json.load(file)
+    with open(os.path.join(folder, about["weights"]["name"]), "rb") as file:
+        data = file.read()
+    (length,) = struct.unpack("<Q", data[:8])
+    tensors = {}
+    for name, entry in json.loads(data[8 : 8 + length]).items():
+        first, last = (8 + length + offset for offset in entry["data_offsets"])
+        tensors[name] = torch.from_numpy(np.frombuffer(data[first:last], "<f4").reshape(entry["shape"]).copy())
+    hidden = about["hidden"][0]
+    network = posterior.Network(len(tensors["input.mean"]), hidden, about["units"], about["components"], 0.0)
+    state = network.state_dict()
+    state["norm_m"], state["norm_s"] = tensors["input.mean"], tensors["input.stddev"]
+    for layer in range(2):
+        weights, bias = tensors[f"layers.{layer}.weights"], tensors[f"layers.{layer}.bias"]
+        state[f"lstm.weight_ih_l{layer}"], state[f"lstm.weight_hh_l{layer}"] = weights[:-hidden].T, weights[-hidden:].T
+        state[f"lstm.bias_ih_l{layer}"], state[f"lstm.bias_hh_l{layer}"] = bias, torch.zeros_like(bias)
+    state["cls.weight"], state["cls.bias"] = tensors["pairs.weights"].T, tensors["pairs.bias"]
+    state["head.c.weight"], state["head.c.bias"] = tensors["context.weights"].T, tensors["context.bias"]
+    # Which coordinates a pair has is part of what the file says of the pair.
+    state["head.k.weight"] = tensors["of_pair"].T
+    state["head.zw"] = torch.cat([tensors["of_coordinate"].T, torch.zeros_like(tensors["of_coordinate"].T)], -1)
+    state["head.w"], state["head.b"] = tensors["out.weights"], tensors["out.bias"]
+    network.load_state_dict(state)
+    return network.eval()
+
+
+@torch.no_grad()
+def ranks(network, pairs, z, x):
+    """Distribution function of each true coordinate after each step, [n, steps, 18]."""
+    head, all_ranks = network.head, []
+    for first in range(0, len(pairs), 500):
+        pair, start, rows = (part[first : first + 500] for part in (pairs, z, x))
+        top = network.lstm((rows - network.norm_m) / network.norm_s)[0]
+        spread = lambda values: values[:, None].expand(-1, top.shape[1], -1)
+        awake = AWAKE[pair]
+        seen = spread(torch.cat([start * awake, awake], -1))
+        hidden = head.c(top) + head.k(spread(F.one_hot(pair, PAIRS).float()))
+        hidden = hidden + F.linear(seen, head.zw * torch.cat([head.zm, head.zm], -1))
+        hidden = torch.tanh(hidden).unflatten(-1, (COORDINATES, head.units))
+        weights, means, log_stddevs = (torch.einsum("...cg,cgk->...ck", hidden, head.w) + head.b).split(head.components, -1)
+        below = torch.special.ndtr((spread(start).unsqueeze(-1) - means) * torch.exp(-log_stddevs.clamp(-6, 3)))
+        all_ranks.append((torch.softmax(weights, -1) * below).sum(-1))
+    return torch.cat(all_ranks)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("network", help="folder of posterior.json")
+    parser.add_argument("starts", help="folder of cargo xtask posterior-data")
+    arguments = parser.parse_args()
+    network = read(arguments.network)
+    pairs, z, steps, about = posterior.load(arguments.starts)
+    found = ranks(network, pairs, z, posterior.features(steps, about["force_scale"]))
+    chosen = [step for step in STEPS if step < about["steps"]]
+    print("| coordinate | episodes |" + "".join(f" after step {step} |" for step in chosen))
+    print("|---|---|" + "---|" * len(chosen))
+    for coordinate, name in enumerate(NAMES):
+        awake = AWAKE[pairs][:, coordinate] > 0
+        cells = []
+        for step in chosen:
+            u = found[awake, step, coordinate].double()
+            covered = ((u >= 0.05) & (u <= 0.95)).double().mean()
+            cells.append(f"{covered:.3f}, {torch.special.ndtri(u.clamp(1e-6, 1 - 1e-6)).std():.2f}")
+        print(f"| {name} | {int(awake.sum())} | " + " | ".join(cells) + " |")
+
+
+if __name__ == "__main__":
+    main()
