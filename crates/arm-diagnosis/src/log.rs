@@ -111,9 +111,14 @@ impl Log {
                         // As far on one side as on the other: a motion goes on, and the median of what comes after the first row is none of it.
                         let beside = BESIDE.min(row - span.start).min(span.end - 1 - row);
                         let (first, last) = (row - beside, row + beside + 1);
-                        middles.push(median(
-                            values[first..last].iter().copied().filter(|value| value.is_finite()).collect(),
-                        ));
+                        middles.push(match beside {
+                            // What the next two lead to.
+                            0 if row + 2 < span.end => 2.0 * values[row + 1] - values[row + 2],
+                            0 if row >= span.start + 2 => 2.0 * values[row - 1] - values[row - 2],
+                            _ => {
+                                median(values[first..last].iter().copied().filter(|value| value.is_finite()).collect())
+                            }
+                        });
                     }
                 }
                 let distance = |(value, middle): (&f64, &f64)| (value - middle).abs();

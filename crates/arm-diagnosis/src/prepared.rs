@@ -307,7 +307,8 @@ impl<'a> Prepared<'a> {
 
     /// By third differences of ticks: what is white in them is noise.
     fn estimate_noise(&mut self) {
-        /// Of a joint's typical torque: simulators have no noise, but no sensor and no model is better than that.
+        /// Least noise, as a share of a joint's typical torque. Simulators have none, but what is smaller than the errors of good torque sensors, some thousandths of
+        /// their range, is no gap that matters.
         const LEAST: f64 = 1e-3;
         let long = self.windows.first().map_or(1, Range::len) as f64;
         self.noise = (0..self.joints())

@@ -1,6 +1,7 @@
 //! The log that comes with the project, of an arm with friction in joint1 and joint3, as poorer sensors would have read it.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use arm_diagnosis::{Diagnosis, Log, Settings, diagnose};
 
@@ -59,4 +60,21 @@ fn readings_that_are_rounded_coarsely_are_not_taken_for_exact_ones() {
     assert_eq!(joints(&diagnosis), [1, 3]);
     assert!(diagnosis.remainder[7].noise_nm > 0.02, "{:?}", diagnosis.remainder[7]);
     assert!(diagnosis.heldout.after < 10.0, "{:?}", diagnosis.heldout);
+}
+
+#[test]
+fn a_first_torque_of_a_sensor_that_has_not_begun_says_nothing() {
+    let rows = AtomicUsize::new(0);
+    let first = |name: &str, value: f64| {
+        let spoilt = name == "joint_torque_1_nm" && rows.fetch_add(1, Ordering::Relaxed) == 0;
+        if spoilt { "500".into() } else { value.to_string() }
+    };
+    let [spoilt, good] = [read(first), read(|_, value| value.to_string())]
+        .map(|log| diagnose(&log.unwrap(), &Settings::default()).unwrap());
+    assert_eq!(joints(&spoilt), [1, 3]);
+    let rms = |diagnosis: &Diagnosis| diagnosis.located.iter().map(|cell| cell.share * cell.rows).sum::<f64>();
+    assert!((rms(&spoilt) / rms(&good) - 1.0).abs() < 0.02, "{} {}", rms(&spoilt), rms(&good));
+    for (a, b) in spoilt.remainder.iter().zip(&good.remainder) {
+        assert!((a.moving_nm / b.moving_nm - 1.0).abs() < 0.02, "{a:?} {b:?}");
+    }
 }
