@@ -19,9 +19,6 @@ use super::{External, NO_DRAWN};
 /// Draws from prior and network at each step.
 const DRAWS: usize = 100;
 
-/// Exponents α of the network's density q over the prior p: the belief p (q / p)^α.
-pub(super) const EXPONENTS: [f64; 8] = [0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 1.0];
-
 /// Numbers whose ranks are taken: names, and whether only hypotheses of the true shape have them.
 pub(super) const NUMBERS: [(&str, bool); 8] = [
     ("mass", false),
@@ -77,9 +74,6 @@ pub struct World {
     pub prior: Vec<Row>,
     /// What the network says.
     pub network: Vec<Row>,
-    /// Log score of each of [`EXPONENTS`] in the network after each action; null where it excludes the truth.
-    #[serde(default)]
-    pub exponents_of_network: Vec<[Option<f64>; EXPONENTS.len()]>,
     /// Transitions of each update.
     pub transitions: Vec<usize>,
     /// Exponent that each update has reached.
@@ -231,14 +225,10 @@ fn played<W: Acted>(
         return Ok(failed("no world of the distribution agrees with the first observation".into()));
     }
     let (mut of_prior, mut of_network) = (vec![draws(&prior)?], vec![draws(&Estimate::network(&history, &network))?]);
-    let mut exponents_of_network = Vec::new();
-    let mut statistics = seed.stream(Purpose::Statistics, 2);
     for (action, observation, joints_rad) in &onlooker.steps {
         network.observe(&problem.model, Some(*action), observation, joints_rad);
         of_prior.push(draws(&prior)?);
-        let estimate = Estimate::network(&history, &network);
-        of_network.push(draws(&estimate)?);
-        exponents_of_network.push(tempered(&history, &estimate, &start, &mut statistics));
+        of_network.push(draws(&Estimate::network(&history, &network))?);
     }
     onlooker.steps.iter().for_each(|(action, observation, joints)| history.push(*action, observation, joints));
     let estimate = Estimate::network(&history, &network);
@@ -255,32 +245,11 @@ fn played<W: Acted>(
         filter: onlooker.rows,
         prior: of_prior,
         network: of_network,
-        exponents_of_network,
         transitions: onlooker.transitions,
         exponents: onlooker.exponents,
         seconds,
         ruler,
         ruler_failure,
-    })
-}
-
-/// ln of the density of p (q / p)^α over the prior p at the truth, α each of [`EXPONENTS`], for what a network says: α r − ln E_q[e^((α − 1) r)] with
-/// r = ln q / p, by draws.
-fn tempered(
-    history: &push_task::History<'_>,
-    estimate: &Estimate<'_>,
-    truth: &Particle,
-    rng: &mut Rng,
-) -> [Option<f64>; EXPONENTS.len()] {
-    let z = history.start_coordinates().of(truth, rng);
-    let Some(own) = z.map(|z| estimate.log_ratio(&truth.theta.classes(), &z)).filter(|own| own.is_finite()) else {
-        return [None; EXPONENTS.len()];
-    };
-    let draws = (0..DRAWS).filter_map(|_| estimate.draw(rng)).map(|(classes, z)| estimate.log_ratio(&classes, &z));
-    let ratios: Vec<f64> = draws.collect();
-    EXPONENTS.map(|exponent| {
-        let mean = ratios.iter().map(|ratio| ((exponent - 1.0) * ratio).exp()).sum::<f64>() / DRAWS as f64;
-        Some(exponent * own - mean.ln())
     })
 }
 

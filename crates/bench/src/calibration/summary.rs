@@ -4,7 +4,7 @@ use pomdp::{Purpose, Rng, Seed};
 use rand::RngExt as _;
 use serde_json::{Map, Value, json};
 
-use super::episode::{EXPONENTS, NUMBERS, Row, World};
+use super::episode::{NUMBERS, Row, World};
 use super::reference::Ruler;
 
 /// Steps that are reported; a world that has ended counts with its last belief.
@@ -70,7 +70,6 @@ pub(super) fn summary(worlds: &[World], provenance: &Value) -> Value {
         "rank_histograms_at_the_last_step": ranks,
         "tarp_histogram_at_the_last_step": tarp,
         "log_score_over_the_better_of_prior_and_network_after_contact": per_update(&after),
-        "network_log_score_by_exponent_after_contact": by_exponent(worlds),
         "solved": each(&|w| f64::from(u8::from(w.reason == "goal")), &mut rng),
         "discounted_return": each(&|w| w.discounted_return, &mut rng),
         "transitions_per_update": per_update(&worlds.iter().flat_map(|w| w.transitions.iter().map(|t| *t as f64)).collect::<Vec<_>>()),
@@ -90,18 +89,6 @@ pub(super) fn summary(worlds: &[World], provenance: &Value) -> Value {
         });
     }
     summary
-}
-
-/// For each of [`EXPONENTS`] α the mean ln density of p (q / p)^α over the prior p at the truth, q what the network says: where it is largest, q is as sure as it may be.
-fn by_exponent(worlds: &[World]) -> Vec<Value> {
-    let after = |w: &World| w.first_contact.unwrap_or(usize::MAX);
-    let rows: Vec<&[Option<f64>; EXPONENTS.len()]> =
-        worlds.iter().flat_map(|w| w.exponents_of_network.iter().skip(after(w).saturating_sub(1))).collect();
-    let score = |place: usize| {
-        let scores: Vec<f64> = rows.iter().filter_map(|row| row[place]).collect();
-        json!({ "exponent": EXPONENTS[place], "log_score": scores.iter().sum::<f64>() / scores.len().max(1) as f64, "steps": scores.len() })
-    };
-    (0..EXPONENTS.len()).map(score).collect()
 }
 
 /// Figures after the last action of worlds that have a ruler, of every source and of the ruler.

@@ -67,17 +67,6 @@ pub fn table(summary: &Value) -> String {
         number(&summary["log_score_over_the_better_of_prior_and_network_after_contact"], 2),
         summary["tarp_histogram_at_the_last_step"]
     );
-    let scores = summary["network_log_score_by_exponent_after_contact"].as_array().into_iter().flatten();
-    let scores: Vec<String> = scores
-        .filter(|row| row["steps"].as_u64() > Some(0))
-        .map(|row| format!("{} at α = {}", number(&row["log_score"], 2), row["exponent"]))
-        .collect();
-    if !scores.is_empty() {
-        text += &format!(
-            "\nln density over the prior p that p (q / p)^α has at the truth, q the network's, after contact: {}.\n",
-            scores.join(", ")
-        );
-    }
     reference(&summary["reference"], &mut text);
     text
 }
