@@ -4,7 +4,7 @@
 
 The network's density is autoregressive, so that its distribution function of each true coordinate, given the readings and the true coordinates
 before it, is uniform if it is calibrated (the probability integral transform; Rosenblatt 1952). For each coordinate and some steps the table has the share
-in [0.05, 0.95], and the standard deviation of the same in normal coordinates: 0.90 and 1 are right, a larger deviation is a network that is too sure.
+in [0.05, 0.95], and the root mean square of the same in normal coordinates: 0.90 and 1 are right, more than 1 is a network that is too sure or off.
 """
 
 import argparse
@@ -50,7 +50,7 @@ def read(folder):
     state["head.zw"] = torch.cat([tensors["of_coordinate"].T, torch.zeros_like(tensors["of_coordinate"].T)], -1)
     state["head.w"], state["head.b"] = tensors["out.weights"], tensors["out.bias"]
     network.load_state_dict(state)
-    return network.eval()
+    return network.eval(), about
 
 
 @torch.no_grad()
@@ -77,19 +77,26 @@ def main():
     parser.add_argument("network", help="folder of posterior.json")
     parser.add_argument("starts", help="folder of cargo xtask posterior-data")
     arguments = parser.parse_args()
-    network = read(arguments.network)
+    network, made_for = read(arguments.network)
     pairs, z, steps, about = posterior.load(arguments.starts)
+    for key in ("robot", "mobility", "distribution", "force_scale"):
+        if about[key] != made_for[key]:
+            raise SystemExit(f"{arguments.starts}: {key} differs from that of {arguments.network}")
+    if made_for["order"] != posterior.ORDER:
+        raise SystemExit(f"{arguments.network}: order is not that of training/posterior.py")
     found = ranks(network, pairs, z, posterior.features(steps, about["force_scale"]))
     chosen = [step for step in STEPS if step < about["steps"]]
     print("| coordinate | episodes |" + "".join(f" after step {step} |" for step in chosen))
     print("|---|---|" + "---|" * len(chosen))
     for coordinate, name in enumerate(NAMES):
         awake = AWAKE[pairs][:, coordinate] > 0
+        if not awake.any():
+            continue
         cells = []
         for step in chosen:
             u = found[awake, step, coordinate].double()
             covered = ((u >= 0.05) & (u <= 0.95)).double().mean()
-            cells.append(f"{covered:.3f}, {torch.special.ndtri(u.clamp(1e-6, 1 - 1e-6)).std():.2f}")
+            cells.append(f"{covered:.3f}, {torch.special.ndtri(u.clamp(1e-6, 1 - 1e-6)).square().mean().sqrt():.2f}")
         print(f"| {name} | {int(awake.sum())} | " + " | ".join(cells) + " |")
 
 
