@@ -259,7 +259,8 @@ mod tests {
             time_secs[700] = time_secs[699];
             let position: Vec<f64> =
                 time_secs.iter().map(|t| size * ((2.0 * t).sin() + 0.6 * (0.7 * t + 1.0).sin())).collect();
-            let readings = Readings { spans: &[0..2000], time_secs: &time_secs, position: &position, velocity: &[] };
+            let spans = std::slice::from_ref(&(0..2000));
+            let readings = Readings { spans, time_secs: &time_secs, position: &position, velocity: &[] };
             // Half a percent of the largest: after the last reading there is none to tell what it was.
             let most = 0.005 * size * (4.0 + 0.6 * 0.49);
             for stated in [None, Some(1e-12)] {
