@@ -17,7 +17,7 @@ import torch
 from torch.nn import functional as F
 
 import posterior
-from posterior import AWAKE, COORDINATES, PAIRS
+from posterior import AWAKE, PAIRS
 
 NAMES = ["mass", "friction", "centre of mass x", "centre of mass y", "centre of mass z", "size 0", "size 1", "size 2", "x", "y", "yaw"]
 NAMES += [f"obstacle's {name}" for name in ("mass", "size 0", "size 1", "size 2", "x", "y", "yaw")]
@@ -56,18 +56,14 @@ def read(folder):
 @torch.no_grad()
 def ranks(network, pairs, z, x):
     """Distribution function of each true coordinate after each step, [n, steps, 18]."""
-    head, all_ranks = network.head, []
+    all_ranks = []
     for first in range(0, len(pairs), 500):
         pair, start, rows = (part[first : first + 500] for part in (pairs, z, x))
         top = network.lstm((rows - network.norm_m) / network.norm_s)[0]
         spread = lambda values: values[:, None].expand(-1, top.shape[1], -1)
-        awake = AWAKE[pair]
-        seen = spread(torch.cat([start * awake, awake], -1))
-        hidden = head.c(top) + head.k(spread(F.one_hot(pair, PAIRS).float()))
-        hidden = hidden + F.linear(seen, head.zw * torch.cat([head.zm, head.zm], -1))
-        hidden = torch.tanh(hidden).unflatten(-1, (COORDINATES, head.units))
-        weights, means, log_stddevs = (torch.einsum("...cg,cgk->...ck", hidden, head.w) + head.b).split(head.components, -1)
-        below = torch.special.ndtr((spread(start).unsqueeze(-1) - means) * torch.exp(-log_stddevs.clamp(-6, 3)))
+        one_hot = F.one_hot(pair, PAIRS).float()
+        weights, means, log_stddevs = network.head.mixture(top, spread(one_hot), spread(start), spread(AWAKE[pair]))
+        below = torch.special.ndtr((spread(start).unsqueeze(-1) - means) * torch.exp(-log_stddevs))
         all_ranks.append((torch.softmax(weights, -1) * below).sum(-1))
     return torch.cat(all_ranks)
 

@@ -95,13 +95,17 @@ class Head(nn.Module):
         with torch.no_grad():
             self.b[:, components : 2 * components] = torch.linspace(-1, 1, components)
 
-    def forward(self, top, pair, z, awake):
+    def mixture(self, top, pair, z, awake):
+        """Weights (before a softmax), means and ln of the spreads of each coordinate's Gaussians, given the coordinates before it."""
         seen = torch.cat([z * awake, awake], -1)
         hidden = self.c(top) + self.k(pair) + F.linear(seen, self.zw * torch.cat([self.zm, self.zm], -1))
         hidden = torch.tanh(hidden).unflatten(-1, (COORDINATES, self.units))
         out = torch.einsum("...cg,cgk->...ck", hidden, self.w) + self.b
         weights, means, log_stddevs = out.split(self.components, -1)
-        log_stddevs = log_stddevs.clamp(-6, 3)
+        return weights, means, log_stddevs.clamp(-6, 3)
+
+    def forward(self, top, pair, z, awake):
+        weights, means, log_stddevs = self.mixture(top, pair, z, awake)
         error = (z.unsqueeze(-1) - means) * torch.exp(-log_stddevs)
         logs = F.log_softmax(weights, -1) - 0.5 * error * error - log_stddevs - HALF_LOG_TAU
         return (torch.logsumexp(logs, -1) * awake).sum(-1)

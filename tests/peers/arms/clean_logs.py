@@ -9,7 +9,6 @@ constant that is 20 % off in one joint, with such masses; a torque that the cata
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 
@@ -20,13 +19,12 @@ import pinocchio  # noqa: E402
 
 import arm_models  # noqa: E402
 import load_logs  # noqa: E402
-from common import read_truth, write_truth  # noqa: E402
+from common import arguments, read_truth, write_truth  # noqa: E402
 
 KINDS = ["none", "masses", "friction", "friction_all", "gain", "outside"]
 
 
 def make(folder: str, name: str, kind: str, rate_hz: int, velocities: bool, rng: np.random.Generator) -> dict:
-    load_logs.RATE_HZ, load_logs.SECS = rate_hz, 20.0
     arm = arm_models.load_arm(name)
     os.makedirs(folder, exist_ok=True)
     for joint in arm.moving:
@@ -36,10 +34,8 @@ def make(folder: str, name: str, kind: str, rate_hz: int, velocities: bool, rng:
     names = [joint.name for joint in arm.moving]
     model = load_logs.reduced(path, names)
     if kind in ("masses", "friction_all", "gain"):
-        for i in range(1, model.njoints):
-            share, old = 1.0 + 0.04 * rng.standard_normal(), model.inertias[i]
-            model.inertias[i] = pinocchio.Inertia(old.mass * share, old.lever, old.inertia * share)
-    time_secs, q, v, a = load_logs.motion(model, rng)
+        load_logs.other_masses(model, 0.04, rng)
+    time_secs, q, v, a = load_logs.motion(model, rng, rate_hz, 20.0)
     data = model.createData()
     torque = np.array([pinocchio.rnea(model, data, *row).copy() for row in zip(q, v, a)])
     usual = np.maximum(np.sqrt((torque**2).mean(0)), 0.05)
@@ -59,9 +55,7 @@ def make(folder: str, name: str, kind: str, rate_hz: int, velocities: bool, rng:
     header = ["time_secs"] + [column.format(i) for column, values in columns for i in range(values.shape[1])]
     rows = np.hstack([time_secs[:, None]] + [values for _, values in columns])
     np.savetxt(os.path.join(folder, "samples.csv"), rows, delimiter=",", header=",".join(header), comments="", fmt="%.17g")
-    with open(os.path.join(folder, "log.toml"), "w", encoding="utf-8") as file:
-        listed = ", ".join(f'"{joint}"' for joint in names)
-        file.write(f'version = 1\nrobot = "arm.urdf"\njoints = [{listed}]\ntip_link = "{arm.tip}"\nperiod_secs = {1 / rate_hz}\n')
+    load_logs.write_header(folder, names, arm.tip, rate_hz)
     return {"arm": name, "kind": kind, "joints": joints}
 
 
@@ -96,23 +90,14 @@ def score(logs: str, answers: str) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", help="folder for the logs and truth.json")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--score", nargs=2, metavar=("LOGS", "ANSWERS"))
-    arguments = parser.parse_args()
-    if arguments.score:
-        score(*arguments.score)
-        return
-    if not arguments.out:
-        parser.error("expected --out or --score")
+    logs, seed = arguments(__doc__, score)
     truth = {}
     for place, name in enumerate(arm_models.CATALOGUE):
         for number, kind in enumerate(KINDS):
             rate_hz, velocities = [100, 500][(place + number) // 2 % 2], (number // 2 + place) % 2 == 1
-            log, rng = f"{name}-{kind}", np.random.default_rng([arguments.seed, place, number])
-            truth[log] = make(os.path.join(arguments.out, log), name, kind, rate_hz, velocities, rng)
-    write_truth(arguments.out, truth)
+            log, rng = f"{name}-{kind}", np.random.default_rng([seed, place, number])
+            truth[log] = make(os.path.join(logs, log), name, kind, rate_hz, velocities, rng)
+    write_truth(logs, truth)
 
 
 if __name__ == "__main__":

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
+from typing import Callable
 
 import numpy as np
 
@@ -28,3 +30,18 @@ def write_truth(folder: str, truth: dict) -> None:
     with open(path + ".new", "w", encoding="utf-8") as file:
         json.dump(truth, file, indent=1, sort_keys=True)
     os.replace(path + ".new", path)
+
+
+def arguments(about: str, score: Callable[[str, str], None]) -> tuple[str, int]:
+    """Folder for the logs and seed; scores and ends where the command line asks for that."""
+    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", help="folder for the logs and truth.json")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--score", nargs=2, metavar=("LOGS", "ANSWERS"))
+    options = parser.parse_args()
+    if options.score:
+        score(*options.score)
+        raise SystemExit
+    if not options.out:
+        parser.error("expected --out or --score")
+    return options.out, options.seed

@@ -9,7 +9,6 @@ standard deviation). A negative load is a body of the file that the robot does n
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import xml.etree.ElementTree as ET
@@ -20,15 +19,15 @@ import numpy as np  # noqa: E402
 import pinocchio  # noqa: E402
 
 import arm_models  # noqa: E402
-from common import read_truth, write_truth  # noqa: E402
+from common import arguments, read_truth, write_truth  # noqa: E402
 
 LOADS_KG = [None, 0.3, 1.0, 2.0, 4.0, -1.0]
 RATE_HZ, SECS = 200, 30.0
 
 
-def motion(model, rng: np.random.Generator) -> list[np.ndarray]:
+def motion(model, rng: np.random.Generator, rate_hz: int = RATE_HZ, secs: float = SECS) -> list[np.ndarray]:
     """Positions, rates and accelerations, a row a sample: sums of sines within 80 % of the ranges and half of the rates."""
-    time_secs = np.arange(0.0, SECS, 1.0 / RATE_HZ)
+    time_secs = np.arange(0.0, secs, 1.0 / rate_hz)
     lower, upper = np.maximum(model.lowerPositionLimit, -2.5), np.minimum(model.upperPositionLimit, 2.5)
     omega = 2.0 * np.pi * np.array([0.06, 0.13, 0.25, 0.43])[:, None] * rng.uniform(0.75, 1.3, (4, model.nv))
     size, phase = rng.uniform(0.4, 1.0, omega.shape) / np.sqrt(omega), rng.uniform(0.0, 2.0 * np.pi, omega.shape)
@@ -56,6 +55,19 @@ def reduced(path: str, joints: list[str]):
     return pinocchio.buildReducedModel(model, locked, pinocchio.neutral(model)) if locked else model
 
 
+def other_masses(model, share_off: float, rng: np.random.Generator) -> None:
+    """Links whose masses are off by a normal share, with their inertias."""
+    for i in range(1, model.njoints):
+        share, old = max(1.0 + share_off * rng.standard_normal(), 0.5), model.inertias[i]
+        model.inertias[i] = pinocchio.Inertia(old.mass * share, old.lever, old.inertia * share)
+
+
+def write_header(folder: str, names: list[str], tip: str, rate_hz: int) -> None:
+    with open(os.path.join(folder, "log.toml"), "w", encoding="utf-8") as file:
+        listed = ", ".join(f'"{joint}"' for joint in names)
+        file.write(f'version = 1\nrobot = "arm.urdf"\njoints = [{listed}]\ntip_link = "{tip}"\nperiod_secs = {1 / rate_hz}\n')
+
+
 def make(folder: str, name: str, load_kg: float | None, rng: np.random.Generator) -> dict:
     arm = arm_models.load_arm(name)
     os.makedirs(folder, exist_ok=True)
@@ -71,9 +83,7 @@ def make(folder: str, name: str, load_kg: float | None, rng: np.random.Generator
         hand = (-load_kg, centre, np.eye(3) * 0.4 * -load_kg * 0.05**2)
         tip.mass, tip.com, tip.inertia = arm_models.merge([(tip.mass, tip.com, tip.inertia), hand])
         arm_models.write_urdf(arm, path)
-    for i in range(1, model.njoints):
-        share, old = max(1.0 + 0.07 * rng.standard_normal(), 0.5), model.inertias[i]
-        model.inertias[i] = pinocchio.Inertia(old.mass * share, old.lever, old.inertia * share)
+    other_masses(model, 0.07, rng)
     if load_kg and load_kg > 0.0:
         frame = model.frames[model.getFrameId(arm.tip, pinocchio.FrameType.BODY)]
         load = pinocchio.Inertia(load_kg, centre, np.eye(3) * 0.4 * abs(load_kg) * 0.05**2)
@@ -93,9 +103,7 @@ def make(folder: str, name: str, load_kg: float | None, rng: np.random.Generator
     columns = ["time_secs"] + [f"joint_{i}_rad" for i in range(len(names))] + [f"joint_torque_{i}_nm" for i in range(len(names))]
     np.savetxt(os.path.join(folder, "samples.csv"), np.hstack([time_secs[:, None], position, torque]), delimiter=",",
                header=",".join(columns), comments="", fmt="%.7g")
-    with open(os.path.join(folder, "log.toml"), "w", encoding="utf-8") as file:
-        listed = ", ".join(f'"{joint}"' for joint in names)
-        file.write(f'version = 1\nrobot = "arm.urdf"\njoints = [{listed}]\ntip_link = "{arm.tip}"\nperiod_secs = {1 / RATE_HZ}\n')
+    write_header(folder, names, arm.tip, RATE_HZ)
     return {"arm": name, "load_kg": load_kg, "centre_m": centre.tolist(), "coulomb_nm": coulomb.tolist(),
             "viscous_nmsprad": viscous.tolist(), "motor_kgm2": motor.tolist()}
 
@@ -134,22 +142,13 @@ def score(logs: str, answers: str) -> None:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", help="folder for the logs and truth.json")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--score", nargs=2, metavar=("LOGS", "ANSWERS"))
-    options = parser.parse_args()
-    if options.score:
-        score(*options.score)
-        return
-    if not options.out:
-        parser.error("expected --out or --score")
+    logs, seed = arguments(__doc__, score)
     truth = {}
     for i, name in enumerate(arm_models.CATALOGUE):
         for k, load in enumerate(LOADS_KG):
             log = f"{name}-{'none' if load is None else load}"
-            truth[log] = make(os.path.join(options.out, log), name, load, np.random.default_rng([options.seed, i, k]))
-    write_truth(options.out, truth)
+            truth[log] = make(os.path.join(logs, log), name, load, np.random.default_rng([seed, i, k]))
+    write_truth(logs, truth)
 
 
 if __name__ == "__main__":
