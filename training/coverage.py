@@ -4,7 +4,8 @@
 
 The network's density is autoregressive, so that its distribution function of each true coordinate, given the readings and the true coordinates
 before it, is uniform if it is calibrated (the probability integral transform; Rosenblatt 1952). For each coordinate and some steps the table has the share
-in [0.05, 0.95], and the root mean square of the same in normal coordinates: 0.90 and 1 are right, more than 1 is a network that is too sure or off.
+in [0.05, 0.95], the root mean square of the same in normal coordinates, and in brackets the episodes that have the coordinate and have not ended: 0.90 and 1
+are right, more than 1 is a network that is too sure or off.
 """
 
 import argparse
@@ -71,29 +72,37 @@ def ranks(network, pairs, z, x):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("network", help="folder of posterior.json")
-    parser.add_argument("starts", help="folder of cargo xtask posterior-data")
+    parser.add_argument("starts", help="folder of cargo xtask posterior-data, or starts of cargo xtask bench calibration")
     arguments = parser.parse_args()
     network, made_for = read(arguments.network)
     pairs, z, steps, about = posterior.load(arguments.starts)
+    there = steps.isfinite().all(-1)
     for key in ("robot", "mobility", "distribution", "force_scale"):
         if about[key] != made_for[key]:
             raise SystemExit(f"{arguments.starts}: {key} differs from that of {arguments.network}")
     if made_for["order"] != posterior.ORDER:
         raise SystemExit(f"{arguments.network}: order is not that of training/posterior.py")
-    found = ranks(network, pairs, z, posterior.features(steps, about["force_scale"]))
+    found = ranks(network, pairs, z, posterior.features(steps.nan_to_num(), about["force_scale"]))
+    ends = there.sum(1) - 1
     chosen = [step for step in STEPS if step < about["steps"]]
-    print("| coordinate | episodes |" + "".join(f" after step {step} |" for step in chosen))
-    print("|---|---|" + "---|" * len(chosen))
+    titles = [f"after step {step}" for step in chosen] + ["at the end"]
+    print("| coordinate | " + " | ".join(titles) + " |")
+    print("|---|" + "---|" * len(titles))
     for coordinate, name in enumerate(NAMES):
         awake = AWAKE[pairs][:, coordinate] > 0
         if not awake.any():
             continue
         cells = []
-        for step in chosen:
-            u = found[awake, step, coordinate].double()
+        for step in [torch.full_like(ends, step) for step in chosen] + [ends]:
+            # An episode that has ended earlier says nothing of a step.
+            rows = (awake & (step <= ends)).nonzero()[:, 0]
+            u = found[rows, step[rows], coordinate].double()
+            if not len(u):
+                cells.append("")
+                continue
             covered = ((u >= 0.05) & (u <= 0.95)).double().mean()
-            cells.append(f"{covered:.3f}, {torch.special.ndtri(u.clamp(1e-6, 1 - 1e-6)).square().mean().sqrt():.2f}")
-        print(f"| {name} | {int(awake.sum())} | " + " | ".join(cells) + " |")
+            cells.append(f"{covered:.3f}, {torch.special.ndtri(u.clamp(1e-6, 1 - 1e-6)).square().mean().sqrt():.2f} ({len(u)})")
+        print(f"| {name} | " + " | ".join(cells) + " |")
 
 
 if __name__ == "__main__":

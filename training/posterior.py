@@ -163,6 +163,8 @@ def load_all(folders):
         for key in ("robot", "mobility", "distribution", "force_scale", "steps"):
             if about[key] != abouts[0][key]:
                 raise SystemExit(f"{folder}: {key} differs from that of {folders[0]}")
+        if not steps.isfinite().all():
+            raise SystemExit(f"{folder}: episodes of different lengths, expected those of cargo xtask posterior-data")
         parts.append((pairs, z, features(steps, about["force_scale"])))
     return [torch.cat(part) for part in zip(*parts)], abouts
 

@@ -14,6 +14,9 @@ use std::time::Duration;
 
 use agent::{ExternalWorld, Network, Timeouts, World as _, WorldAddress, WorldIdentity};
 use anyhow::{Context as _, Result, bail, ensure};
+use prior::posterior::STEP_VALUES;
+use prior_training::starts;
+use push_task::coordinates::START;
 use rayon::prelude::*;
 use scenario::{Problem, Selection};
 use serde_json::{Value, json};
@@ -31,7 +34,9 @@ const WORLD_LIMIT: Duration = Duration::from_secs(60);
 /// What is missing in an answer.
 const NO_DRAWN: &str = "expected `drawn` in its answer to `reset` (docs/src/reference/world-protocol.md)";
 /// Keys of `task.json` that have to be those of the task.
-const OF_TASK: [&str; 5] = ["scenario", "seed", "network", "world", "reference"];
+const OF_TASK: [&str; 6] = ["version", "scenario", "seed", "network", "world", "reference"];
+/// Version of what is kept of a world.
+const VERSION: u32 = 2;
 /// Most bytes of a world's file.
 const MOST_BYTES: u64 = 1 << 24;
 
@@ -106,7 +111,7 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     let folder = prior.clone().unwrap_or_else(|| Network::default_folder(root, &problem, *quick));
     let network = Network::load(&folder, &problem)?;
     let mut identity = json!({
-        "scenario": scenario, "seed": from.seed, "network": network.hash(),
+        "version": VERSION, "scenario": scenario, "seed": from.seed, "network": network.hash(),
     });
     let external = world.as_ref().map(|address| External::new(address, &problem, from.seed)).transpose()?;
     if let Some(external) = &external {
@@ -176,7 +181,29 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     whole_file::write(&out.join("calibration.json"), pretty(&summary).as_bytes(), Existing::Replace)?;
     whole_file::write(&out.join("calibration.md"), table(&summary).as_bytes(), Existing::Replace)?;
     figures::save(&summary, out)?;
+    save_starts(&problem, &network, &played, &provenance, out)?;
     Ok(summary)
+}
+
+/// The episodes as arrays, for `training/coverage.py`.
+fn save_starts(problem: &Problem, network: &Network, worlds: &[World], provenance: &Value, out: &Path) -> Result<()> {
+    let Network::Posterior(network) = network else { bail!("expected the network of a bridge filter") };
+    let rows = || worlds.iter().map(|world| &world.values).filter(|values| !values.is_empty());
+    let longest = rows().map(Vec::len).max().unwrap_or(0);
+    let padded = |values: &Vec<f32>| {
+        let missing = longest - values.len();
+        values
+            .iter()
+            .copied()
+            .chain(std::iter::repeat_n(f32::NAN, missing))
+            .flat_map(f32::to_le_bytes)
+            .collect::<Vec<_>>()
+    };
+    let bytes: Vec<u8> = rows().flat_map(padded).collect();
+    let steps = longest.saturating_sub(2 + START) / STEP_VALUES;
+    let mobility = problem.scenario.world.obstacle_mobility;
+    let about = starts::about(problem, network.distribution(), mobility, [rows().count(), steps], provenance);
+    Ok(starts::write(&out.join("starts"), &bytes, &about)?)
 }
 
 /// A key's value where it is short enough for a sentence.

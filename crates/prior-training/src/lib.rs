@@ -3,6 +3,8 @@
 //! Apart from [`prior`], which suggests and learns without files of episodes: programs that only play need neither Parquet nor Arrow, most of a first
 //! build. The programs `train` and `calibrate` are here.
 
+pub mod starts;
+
 use dataset::{Episode, Schema};
 
 use physics_model::Theta;

@@ -7,7 +7,8 @@ use agent::{
 use anyhow::{Result, bail};
 use belief::Particles;
 use physics_model::config::ObstacleMobility;
-use pomdp::{Belief as _, Purpose, Replay as _, Rng, Seed, Teacher as _};
+use pomdp::{Purpose, Replay as _, Rng, Seed, Teacher as _};
+use prior_training::starts;
 use push_task::{Action, Observation, Particle};
 use rand::RngExt as _;
 use scenario::Problem;
@@ -15,9 +16,6 @@ use serde::{Deserialize, Serialize};
 
 use super::reference::{Ruler, ruler};
 use super::{External, NO_DRAWN};
-
-/// Draws from prior and network at each step.
-const DRAWS: usize = 100;
 
 /// Numbers whose ranks are taken: names, and whether only hypotheses of the true shape have them.
 pub(super) const NUMBERS: [(&str, bool); 8] = [
@@ -34,13 +32,16 @@ pub(super) const NUMBERS: [(&str, bool); 8] = [
 /// What one belief says of the true world.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
+    /// Effective number of draws: a belief that is down to a few cannot be told from a calibrated one by its ranks.
+    pub effective: f64,
     /// Probability of an obstacle.
     pub obstacle: f64,
     /// Probability of the object's true shape, and of the obstacle's true class, or none.
     pub shape: f64,
     /// See `shape`.
     pub obstacle_class: f64,
-    /// P(number < true one) + P(equal) u with u uniform, for each of [`NUMBERS`]; null where the shape has no such number.
+    /// Rank of the true value among n draws and itself, (n P(number < true one) + u (n P(equal) + 1)) / (n + 1) with u uniform and n the effective size, for
+    /// each of [`NUMBERS`]: uniform for a calibrated belief, however few the draws (Talts et al. 2018). Null where the shape has no such number.
     pub ranks: Vec<Option<f64>>,
     /// Mean of ln mass minus the true one.
     pub log_mass_error: f64,
@@ -86,6 +87,8 @@ pub struct World {
     /// Why there is no ruler although it was asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ruler_failure: Option<String>,
+    /// Classes and coordinates of the start in the network's distribution, and the values of each step ([`starts`]).
+    pub values: Vec<f32>,
 }
 
 /// Looks on and keeps what later replays need.
@@ -212,13 +215,20 @@ fn played<W: Acted>(
     network.reset();
     network.observe(&problem.model, None, &observation, &joints_rad);
     let mut history = agent::history(problem, Some(&network), &observation);
+    let coordinates = history.start_coordinates().with_distribution(network.distribution());
+    let steps = std::iter::once((None, observation.clone(), joints_rad.as_slice()));
+    let steps =
+        steps.chain(onlooker.steps.iter().map(|(action, seen, joints)| (Some(*action), seen.clone(), &joints[..])));
+    let values = starts::values(problem, &coordinates, &start, &mut seed.stream(Purpose::Statistics, 2), steps);
     let prior = Estimate::prior(&history);
+    // As many as the filter has effective ones.
+    let count = problem.scenario.belief.bridge.effective.round() as usize;
     let mut draws = |estimate: &Estimate<'_>| -> Result<Row> {
-        let drawn = (0..10 * DRAWS).filter_map(|_| {
+        let drawn = (0..10 * count).filter_map(|_| {
             let (classes, z) = estimate.draw(&mut rng)?;
             Some(history.start(&classes, &z)?.0)
         });
-        let belief = Particles::uniform(drawn.take(DRAWS).collect())?;
+        let belief = Particles::uniform(drawn.take(count).collect())?;
         Ok(row(&belief, &start, &mut rng))
     };
     if onlooker.rows.is_empty() {
@@ -250,6 +260,7 @@ fn played<W: Acted>(
         seconds,
         ruler,
         ruler_failure,
+        values: values.unwrap_or_default(),
     })
 }
 
@@ -292,7 +303,8 @@ fn has(truth: &Particle, index: usize) -> bool {
 }
 
 pub(super) fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng) -> Row {
-    let weighted: Vec<(&Particle, f64)> = belief.iter().filter(|(_, weight)| *weight > 0.0).collect();
+    let weighted = distinct(belief);
+    let effective = effective_size(weighted.iter().map(|(_, weight)| *weight));
     let mean = |value: &dyn Fn(&Particle) -> f64| weighted.iter().map(|(p, w)| w * value(p)).sum::<f64>();
     let share = |holds: &dyn Fn(&Particle) -> bool| mean(&|p| f64::from(u8::from(holds(p))));
     let [true_shape, true_obstacle] = truth.theta.classes();
@@ -305,9 +317,10 @@ pub(super) fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng)
         let mass = share(&of_shape);
         let u: f64 = rng.random();
         (has(truth, index) && mass > 0.0).then(|| {
-            let below = share(&|p| of_shape(p) && numbers(p)[index] < true_numbers[index]);
-            let equal = share(&|p| of_shape(p) && numbers(p)[index] == true_numbers[index]);
-            (below + u * equal) / mass
+            let count = effective_size(weighted.iter().filter(|(p, _)| of_shape(p)).map(|(_, w)| *w));
+            let below = share(&|p| of_shape(p) && numbers(p)[index] < true_numbers[index]) / mass;
+            let equal = share(&|p| of_shape(p) && numbers(p)[index] == true_numbers[index]) / mass;
+            (count * below + u * (count * equal + 1.0)) / (count + 1.0)
         })
     });
     let ranks = ranks.collect();
@@ -320,7 +333,7 @@ pub(super) fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng)
     let (log_mass_error, mass_score) = gaussian(&|p| p.theta.object.mass_kg.ln());
     let (friction_error, friction_score) = gaussian(&|p| p.theta.object.friction);
     // The mass of a class that no draw has is at most a draw's.
-    let floor = 0.5 / weighted.len() as f64;
+    let floor = 0.5 / effective;
     let obstacle_m = truth.state.obstacle.as_ref().and_then(|body| {
         let with = share(&|p| p.state.obstacle.is_some());
         let off = |axis: usize| {
@@ -330,6 +343,7 @@ pub(super) fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng)
         (with > 0.0).then(|| off(0).hypot(off(1)))
     });
     Row {
+        effective,
         obstacle: share(&|p| p.theta.obstacle.is_some()),
         shape,
         obstacle_class,
@@ -337,7 +351,7 @@ pub(super) fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng)
         log_mass_error,
         friction_error,
         log_score: both.max(floor).ln() + mass_score + friction_score,
-        tarp: tarp(belief, truth, rng),
+        tarp: tarp(&weighted, truth, rng),
         obstacle_m,
     }
 }
@@ -358,10 +372,45 @@ fn joint(particle: &Particle) -> [f64; 7] {
     ]
 }
 
-fn tarp(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng) -> f64 {
-    // A point that knows nothing of the truth: a draw of the belief, blurred.
-    let centre = joint(belief.sample(rng)).map(|value| value + 2.0 * (rng.random::<f64>() - 0.5));
+/// Where the truth stands among the draws by its distance from a point that knows nothing of it: one of the draws, blurred, which is then left out.
+fn tarp(weighted: &[(&Particle, f64)], truth: &Particle, rng: &mut Rng) -> f64 {
+    let mut rest: f64 = rng.random();
+    let drawn = weighted.iter().position(|(_, weight)| {
+        rest -= weight;
+        rest < 0.0
+    });
+    let drawn = drawn.unwrap_or(weighted.len() - 1);
+    let centre = joint(weighted[drawn].0).map(|value| value + 2.0 * (rng.random::<f64>() - 0.5));
     let distance = |particle: &Particle| joint(particle).iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
     let of_truth = distance(truth);
-    belief.iter().filter(|(particle, _)| distance(particle) < of_truth).map(|(_, weight)| weight).sum()
+    let others = || weighted.iter().enumerate().filter(|(index, _)| *index != drawn).map(|(_, other)| other);
+    let mass: f64 = others().map(|(_, weight)| weight).sum();
+    let u: f64 = rng.random();
+    if mass <= 0.0 {
+        return u;
+    }
+    let count = effective_size(others().map(|(_, weight)| *weight));
+    let nearer: f64 = others().filter(|(particle, _)| distance(particle) < of_truth).map(|(_, weight)| weight).sum();
+    (count * nearer / mass + u) / (count + 1.0)
+}
+
+/// Particles with weights above 0; those that say the same are one.
+fn distinct(belief: &Particles<Particle>) -> Vec<(&Particle, f64)> {
+    let mut weighted: Vec<(&Particle, f64)> = Vec::new();
+    let mut places = std::collections::BTreeMap::new();
+    for (particle, weight) in belief.iter().filter(|(_, weight)| *weight > 0.0) {
+        let same = (particle.theta.classes(), numbers(particle).map(f64::to_bits));
+        let place = *places.entry(same).or_insert(weighted.len());
+        match weighted.get_mut(place) {
+            Some((_, sum)) => *sum += weight,
+            None => weighted.push((particle, weight)),
+        }
+    }
+    weighted
+}
+
+/// (Σ w)² / Σ w² (Kish 1965).
+fn effective_size(weights: impl Iterator<Item = f64>) -> f64 {
+    let (sum, squares) = weights.fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
+    sum * sum / squares
 }

@@ -119,9 +119,10 @@ fn figures_of_a_row() -> Vec<(String, Figure)> {
     let mut figures: Vec<(String, Figure)> = vec![
         ("obstacle_brier".into(), Box::new(move |w, row| Some((row.obstacle - truth(w)).powi(2)))),
         ("obstacle_brier_without_obstacle".into(), Box::new(|w, row| (!w.has_obstacle).then(|| row.obstacle.powi(2)))),
-        // A probability of 0 is one that no draw of some hundred has.
-        ("shape_nats".into(), Box::new(|_, row| Some(-row.shape.max(0.002).ln()))),
-        ("obstacle_class_nats".into(), Box::new(|_, row| Some(-row.obstacle_class.max(0.002).ln()))),
+        // A probability of 0 is one that no draw has.
+        ("shape_nats".into(), Box::new(|_, row| Some(-row.shape.max(0.5 / row.effective).ln()))),
+        ("obstacle_class_nats".into(), Box::new(|_, row| Some(-row.obstacle_class.max(0.5 / row.effective).ln()))),
+        ("effective".into(), Box::new(|_, row| Some(row.effective))),
         ("log_mass_error".into(), Box::new(|_, row| Some(row.log_mass_error.abs()))),
         ("friction_error".into(), Box::new(|_, row| Some(row.friction_error.abs()))),
         ("log_score".into(), Box::new(|_, row| Some(row.log_score))),

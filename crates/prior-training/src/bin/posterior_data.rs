@@ -9,11 +9,8 @@ use dataset::{Episode, Reader};
 use physics_model::Theta;
 use physics_model::config::ObstacleMobility;
 use pomdp::{Purpose, Seed};
-use prior::posterior::{STEP_VALUES, step_values};
-use prior::write_atomically;
+use prior_training::starts::{self, FILES};
 use program::{Failed, typed};
-use push_task::config::ForceSensing;
-use push_task::coordinates::START;
 use push_task::state::State;
 use push_task::{Action, Coordinates, Observation, Particle};
 use rayon::prelude::*;
@@ -50,9 +47,6 @@ Examples:
 /// What went wrong after the input was found to be good.
 const FAILED: Failed = Failed::new("the arrays were not written");
 
-/// What is written, with what it is last.
-const FILES: [&str; 2] = ["starts.f32", "starts.json"];
-
 fn main() -> ExitCode {
     program::finish(run(&program::parse()))
 }
@@ -88,7 +82,7 @@ fn run(arguments: &Arguments) -> Result<()> {
         );
     }
 
-    let (mut values, mut episodes, mut steps) = (Vec::new(), 0_u64, None);
+    let (mut values, mut episodes, mut steps) = (Vec::new(), 0, None);
     for shard in 0..reader.manifest().shards.len() {
         let recorded = reader.shard_episodes(shard)?;
         // A world that diverged ends early; the others are as long as each other.
@@ -102,13 +96,9 @@ fn run(arguments: &Arguments) -> Result<()> {
             values.extend(row.iter().flat_map(|value| value.to_le_bytes()));
         }
     }
-    let about = about(&problem, mobility, &reader, episodes, steps.unwrap_or(0));
-    std::fs::create_dir_all(&arguments.out).context(FAILED)?;
-    let text = serde_json::to_string_pretty(&about).context(FAILED)?;
-    for (file, bytes) in [(&values_file, values.as_slice()), (&about_file, text.as_bytes())] {
-        write_atomically(file, bytes).context(FAILED)?;
-    }
-    let left_out = reader.manifest().episodes - episodes;
+    let about = about(&problem, mobility, &reader, [episodes, steps.unwrap_or(0)]);
+    starts::write(&arguments.out, &values, &about).context(FAILED)?;
+    let left_out = reader.manifest().episodes - episodes as u64;
     program::out!("{}: {episodes} episodes, {left_out} that diverged are left out", typed(&arguments.out));
     Ok(())
 }
@@ -133,33 +123,20 @@ fn row(problem: &Problem, episode: &Episode) -> Option<Vec<f32>> {
     let theta = Theta::from_parts(&theta, [episode.classes[0], episode.classes[1]].map(usize::from));
     let state = State::from_slice(episode.state(0), joints, theta.obstacle.is_some());
     let coordinates = Coordinates::new(model, &problem.beliefs, &problem.start_joints_rad, &observation(0));
-    let mut rng = Seed(0).stream(Purpose::Resolution, episode.episode);
-    let z = coordinates.of(&Particle::new(state, theta), &mut rng)?;
-    let mut row: Vec<f32> = episode.classes[..2].iter().map(|class| f32::from(*class)).collect();
-    row.extend(z[..START].iter().map(|z| *z as f32));
-    for step in 0..episode.rows() {
+    let steps = (0..episode.rows()).map(|step| {
         let action = usize::try_from(episode.action[step]).ok().and_then(|index| Action::ALL.get(index).copied());
-        row.extend(step_values(model, action, &observation(step), &episode.state(step)[..joints]));
-    }
-    Some(row)
+        (action, observation(step), &episode.state(step)[..joints])
+    });
+    let mut rng = Seed(0).stream(Purpose::Resolution, episode.episode);
+    starts::values(problem, &coordinates, &Particle::new(state, theta), &mut rng, steps)
 }
 
 /// What the arrays are.
-fn about(problem: &Problem, mobility: ObstacleMobility, reader: &Reader, episodes: u64, steps: usize) -> Value {
-    let (sensor, manifest) = (&problem.model.config().sensor, reader.manifest());
-    let noise = &sensor.noise;
-    let (force, torque, joint) = (noise.force_n, noise.torque_nm, noise.joint_torque_nm);
-    let force_scale = match sensor.force {
-        ForceSensing::Wrist => [force, force, force, torque, torque, torque],
-        ForceSensing::JointTorques => [joint; 6],
-    };
-    json!({
-        "version": 1, "robot": problem.scenario.robot.name, "mobility": mobility,
-        "episodes": episodes, "steps": steps, "coordinates": START, "step_values": STEP_VALUES,
-        "force_scale": force_scale, "distribution": problem.beliefs,
-        "dataset": {
-            "plan_hash": manifest.plan_hash, "scenario_hash": manifest.scenario_hash, "seed": manifest.seed,
-            "transitions": manifest.transitions, "commit": manifest.commit,
-        },
-    })
+fn about(problem: &Problem, mobility: ObstacleMobility, reader: &Reader, size: [usize; 2]) -> Value {
+    let manifest = reader.manifest();
+    let dataset = json!({
+        "plan_hash": manifest.plan_hash, "scenario_hash": manifest.scenario_hash, "seed": manifest.seed,
+        "transitions": manifest.transitions, "commit": manifest.commit,
+    });
+    starts::about(problem, &problem.beliefs, mobility, size, &dataset)
 }
