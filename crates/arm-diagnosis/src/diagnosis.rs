@@ -107,7 +107,7 @@ pub struct HeldOut {
 /// What is left in a joint when everything that the catalogue has is fitted.
 #[derive(Clone, Debug, Serialize)]
 pub struct Remainder {
-    /// Standard deviation of the sensors' noise in a window of 0.04 s, N·m.
+    /// Standard deviation that noise of torques and of the motion makes in a window of 0.04 s, N·m; at least a thousandth of the joint's usual torque.
     pub noise_nm: f64,
     /// What is left while the joint moves, and while it stands, N·m.
     pub moving_nm: f64,

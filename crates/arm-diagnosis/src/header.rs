@@ -172,7 +172,8 @@ impl Header {
             if let Some(wrong) =
                 (0..joints).filter_map(|j| list.of(j)).find(|value| !(*value >= least && value.is_finite()))
             {
-                return Err(refuse(path, &format!("{key} has {wrong}, expected a positive number")));
+                let or = if key.starts_with("noise") { ", or no such key: then it is estimated" } else { "" };
+                return Err(refuse(path, &format!("{key} has {wrong}, expected a positive number{or}")));
             }
         }
         Ok(())

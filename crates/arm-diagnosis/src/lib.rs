@@ -25,6 +25,7 @@ mod report;
 mod samples;
 mod search;
 mod smooth;
+mod stamps;
 mod ticks;
 mod values;
 

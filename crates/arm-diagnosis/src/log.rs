@@ -20,7 +20,7 @@ pub struct Log {
     pub arm: Arm,
     /// First row of each episode, and the number of rows.
     pub episodes: Vec<usize>,
-    /// s from the start of the episode.
+    /// s from the first row.
     pub time_secs: Vec<f64>,
     /// Measured, rad.
     pub position: Readings,
@@ -64,6 +64,7 @@ impl Log {
         log.drop_outliers();
         log.check(&samples)?;
         log.shorten();
+        log.settle_stamps();
         // What moved only in the stretches that are left out.
         log.leave_out_dead_torques(&samples)?;
         Ok(log)

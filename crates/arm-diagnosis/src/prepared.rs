@@ -7,11 +7,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::log::{Log, median};
-use crate::smooth::{Readings, Smooth};
+use crate::smooth::{MEDIAN_SQUARE, Readings, Smooth, WINDOW_SECS};
 use crate::ticks::Ticks;
 
-/// Length of a window, s. Features are computed for each tick and averaged, so that only what is quicker than this is lost.
-const WINDOW_SECS: f64 = 0.04;
 /// Length of a piece, s: what is held out, and what errs together.
 const PIECE_SECS: f64 = 2.0;
 /// A joint that is slower than this, rad/s, stands: what its friction holds is not known.
@@ -53,7 +51,7 @@ pub(crate) struct Prepared<'a> {
     pub(crate) scale: Vec<f64>,
     /// Typical rate of each joint, rad/s.
     pub(crate) usual_rate: Vec<f64>,
-    /// Standard deviation of a window's mean of measured torque, as far as it is noise, N·m, for each joint.
+    /// Standard deviation of a window's mean of measured less simulated torque, as far as noise of sensors makes it, N·m, for each joint.
     pub(crate) noise: Vec<f64>,
 }
 
@@ -292,20 +290,32 @@ impl<'a> Prepared<'a> {
     /// Standard deviation that rounding of a joint's torques makes in the mean of a window, N·m. Readings that repeat have the same error, so a mean is as good as its
     /// different readings make it.
     fn rounding(&self, joint: usize) -> f64 {
-        /// Share of the steps that are smaller than the one that is taken: a stray one is not the sensor's.
-        const STRAY: f64 = 0.02;
-        let Some(values) = self.log.torque.get(joint) else { return 0.0 };
-        let pairs = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| step.is_finite());
-        let all = pairs.clone().count().max(1) as f64;
-        let mut steps: Vec<f64> = pairs.filter(|step| *step > 1e-12).collect();
-        steps.sort_by(f64::total_cmp);
-        let Some(step) = steps.get((STRAY * steps.len() as f64) as usize) else { return 0.0 };
+        let Some((step, share)) = self.log.torque.get(joint).and_then(|values| resolution(values)) else { return 0.0 };
         let rows = (self.windows.first().map_or(1, Range::len) * self.ticks.rows) as f64;
-        let different = (rows * steps.len() as f64 / all).max(1.0);
+        let different = (rows * share).max(1.0);
         step / 12.0_f64.sqrt() / different.sqrt()
     }
 
-    /// By third differences of ticks: what is white in them is noise.
+    /// Standard deviation of measured less simulated torque in a window, N·m, from how well the motion is known. What rounding hides of a
+    /// position lasts while the joint is slow. It errs in the servo's torque, of this `stiffness`, as in the model's.
+    fn motion_noise(&self, joint: usize, stiffness: f64) -> f64 {
+        let square = |values: &mut dyn Iterator<Item = f64>| {
+            let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value * value, count + 1));
+            sum / f64::from(count.max(1))
+        };
+        let of_moved = |moved: usize| {
+            let own = |value: f64| if moved == joint { value } else { 0.0 };
+            let rounded = resolution(&self.log.position[moved]).map_or(0.0, |(step, _)| step * step / 12.0);
+            let reflected = own(self.reflected_inertia(joint) * self.gain(joint));
+            let inertia = self.inertia[moved][joint].iter().map(|inertia| inertia + reflected);
+            let gradient = self.stiffness[moved][joint].iter().map(|gradient| gradient + own(stiffness));
+            square(&mut { inertia }) * self.motion[moved].acceleration_stddev.powi(2)
+                + square(&mut { gradient }) * rounded
+        };
+        (0..self.joints()).map(of_moved).sum::<f64>().sqrt()
+    }
+
+    /// Of torques by third differences of ticks: what is white in them is noise.
     fn estimate_noise(&mut self) {
         /// Least noise, as a share of a joint's typical torque. Simulators have none, but what is smaller than the errors of good torque sensors, some thousandths of
         /// their range, is no gap that matters.
@@ -315,7 +325,9 @@ impl<'a> Prepared<'a> {
             .map(|joint| {
                 if let Some(servo) = self.log.header.servo.as_ref().filter(|_| self.servo_damping.is_some()) {
                     // The error of position is read with the noise of positions.
-                    return (servo.stiffness_nmprad.of(joint).unwrap_or(0.0) * self.motion[joint].noise / long.sqrt())
+                    let stiffness = servo.stiffness_nmprad.of(joint).unwrap_or(0.0);
+                    return (stiffness * self.motion[joint].noise / long.sqrt())
+                        .hypot(self.motion_noise(joint, stiffness))
                         .max(LEAST * self.scale[joint]);
                 }
                 let given = self.log.header.noise.joint_torque_nm.as_ref().and_then(|numbers| numbers.of(joint));
@@ -326,14 +338,37 @@ impl<'a> Prepared<'a> {
                         let squares = thirds
                             .map(|four| (four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]).powi(2) / 20.0)
                             .filter(|square| square.is_finite());
-                        // The median of the square of a normal number is 0.455.
-                        (median(squares.collect()) / 0.455).sqrt()
+                        (median(squares.collect()) / MEDIAN_SQUARE).sqrt()
                     }
                 };
-                (read / long.sqrt()).max(self.rounding(joint)).max(LEAST * self.scale[joint])
+                let read = (read / long.sqrt()).max(self.rounding(joint));
+                read.hypot(self.motion_noise(joint, 0.0)).max(LEAST * self.scale[joint])
             })
             .collect();
     }
+}
+
+/// The step to which readings are rounded, and the share of rows that differ from the one before; `None` where they are not rounded: changes are no multiples.
+fn resolution(values: &[f64]) -> Option<(f64, f64)> {
+    /// Share of the changes that are smaller than the one that is taken, or no multiples of it: a stray one is not the sensor's.
+    const STRAY: f64 = 0.02;
+    /// Steps in the least change, at most: readings that are never at rest, and seldom.
+    const MOST: u32 = 8;
+    /// How far from a whole number, at most, a multiple is: of 10 % of other numbers.
+    const OFF: f64 = 0.05;
+    let pairs = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| step.is_finite());
+    let all = pairs.clone().count().max(1) as f64;
+    let mut changes: Vec<f64> = pairs.filter(|step| *step > 1e-12).collect();
+    changes.sort_by(f64::total_cmp);
+    let least = *changes.get((STRAY * changes.len() as f64) as usize)?;
+    // Large multiples show the digits that were written, not the sensor's.
+    let small = || changes.iter().map(|change| change / least).take_while(|multiple| *multiple < f64::from(MOST));
+    let off = |parts: u32| {
+        let others = small().map(|multiple| multiple * f64::from(parts)).filter(|m| (m - m.round()).abs() > OFF);
+        others.count() as f64
+    };
+    let parts = (1..=MOST).find(|parts| off(*parts) <= 2.0 * STRAY * small().count() as f64)?;
+    Some((least / f64::from(parts), changes.len() as f64 / all))
 }
 
 fn elapsed(ticks: &Ticks) -> Vec<f64> {

@@ -106,6 +106,9 @@ pub(crate) fn read_samples(path: &Path, header: Header, arm: Arm) -> Result<Log,
         columns.add(path, &names, &record, &mut episode, &mut log)?;
     }
     log.episodes.push(log.time_secs.len());
+    // Stamps may count from 1970: then few digits are left of what is between them.
+    let first = log.time_secs.first().copied().unwrap_or(0.0);
+    log.time_secs.iter_mut().for_each(|time| *time -= first);
     for (joint, values) in log.torque.iter_mut().enumerate() {
         let constant = constants.get(joint).copied().unwrap_or(1.0);
         values.iter_mut().for_each(|value| *value *= constant);

@@ -22,9 +22,16 @@ pub(crate) struct Ticks {
 
 impl Ticks {
     pub(crate) fn new(log: &Log) -> Self {
-        // By the log's own stamps: a period that is stated wrongly is not rare.
-        let period = log.median_step();
-        let rows = (TICK_SECS / period + 1e-6).floor().max(1.0) as usize;
+        Self::of_rows(log, Self::rows_in(log))
+    }
+
+    /// Rows in a tick, by the log's own stamps: a period that is stated wrongly is not rare. One that is off by a percent is the same.
+    pub(crate) fn rows_in(log: &Log) -> usize {
+        (TICK_SECS / log.median_step() * 1.01).floor().max(1.0) as usize
+    }
+
+    /// Ticks of so many rows.
+    pub(crate) fn of_rows(log: &Log, rows: usize) -> Self {
         let groups: Vec<Vec<std::ops::Range<usize>>> = log
             .rows()
             .map(|episode| {

@@ -3,6 +3,9 @@
     python clean_logs.py --out DIR --seed 6             logs of eight arms with what each hides, and truth.json
     python clean_logs.py --score DIR ANSWERS            what `diagnose --out ANSWERS/NAME` says of each, beside the truth
 
+`--readings` says what loggers and encoders did to them: `exact` (nothing), `milliseconds` (stamps are rounded), `jitter` (stamps of steady rows are up to a fifth of a
+period off), `uneven` (so are the rows, and stamps are right), `encoder` (positions in 4,096 or 16,384 counts a turn, no velocities).
+
 Hidden: nothing; masses that are 4 % off (one standard deviation), which is nothing either; friction in one joint, or in all with such masses; a torque
 constant that is 20 % off in one joint, with such masses; a torque that the catalogue lacks. 100 or 500 Hz, 20 s, with velocities or without.
 """
@@ -22,9 +25,22 @@ import load_logs  # noqa: E402
 from common import arguments, read_truth, write_truth  # noqa: E402
 
 KINDS = ["none", "masses", "friction", "friction_all", "gain", "outside"]
+READINGS = ["exact", "milliseconds", "jitter", "uneven", "encoder"]
 
 
-def make(folder: str, name: str, kind: str, rate_hz: int, velocities: bool, rng: np.random.Generator) -> dict:
+def spoil(readings: str, rate_hz: int, time_secs: np.ndarray, q: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps and positions as they are logged."""
+    if readings == "milliseconds":
+        return np.round(time_secs, 3), q
+    if readings == "jitter":
+        return time_secs + rng.uniform(-0.2, 0.2, len(time_secs)) / rate_hz, q
+    if readings == "encoder":
+        count = 2.0 * np.pi / rng.choice([4096, 16384])
+        return time_secs, np.round(q / count) * count
+    return time_secs, q
+
+
+def make(folder: str, name: str, kind: str, rate_hz: int, velocities: bool, readings: str, rng: np.random.Generator) -> dict:
     arm = arm_models.load_arm(name)
     os.makedirs(folder, exist_ok=True)
     for joint in arm.moving:
@@ -35,7 +51,8 @@ def make(folder: str, name: str, kind: str, rate_hz: int, velocities: bool, rng:
     model = load_logs.reduced(path, names)
     if kind in ("masses", "friction_all", "gain"):
         load_logs.other_masses(model, 0.04, rng)
-    time_secs, q, v, a = load_logs.motion(model, rng, rate_hz, 20.0)
+    off = rng.uniform(-0.2, 0.2, int(20.0 * rate_hz)) / rate_hz if readings == "uneven" else 0.0
+    time_secs, q, v, a = load_logs.motion(model, rng, rate_hz, 20.0, off)
     data = model.createData()
     torque = np.array([pinocchio.rnea(model, data, *row).copy() for row in zip(q, v, a)])
     usual = np.maximum(np.sqrt((torque**2).mean(0)), 0.05)
@@ -51,6 +68,7 @@ def make(folder: str, name: str, kind: str, rate_hz: int, velocities: bool, rng:
     elif kind == "outside":
         others = [(joint + 1) % len(names), (joint + 2) % len(names)]
         torque[:, joint] += 0.2 * usual[joint] * np.sin(3.0 * q[:, others[0]]) * np.sign(v[:, others[1]])
+    time_secs, q = spoil(readings, rate_hz, time_secs, q, rng)
     columns = [("joint_{}_rad", q)] + ([("joint_{}_rps", v)] if velocities else []) + [("joint_torque_{}_nm", torque)]
     header = ["time_secs"] + [column.format(i) for column, values in columns for i in range(values.shape[1])]
     rows = np.hstack([time_secs[:, None]] + [values for _, values in columns])
@@ -90,14 +108,18 @@ def score(logs: str, answers: str) -> None:
 
 
 def main() -> None:
-    logs, seed = arguments(__doc__, score)
+    options = arguments(__doc__, score, readings=READINGS)
     truth = {}
     for place, name in enumerate(arm_models.CATALOGUE):
         for number, kind in enumerate(KINDS):
             rate_hz, velocities = [100, 500][(place + number) // 2 % 2], (number // 2 + place) % 2 == 1
-            log, rng = f"{name}-{kind}", np.random.default_rng([seed, place, number])
-            truth[log] = make(os.path.join(logs, log), name, kind, rate_hz, velocities, rng)
-    write_truth(logs, truth)
+            if options.readings == "milliseconds":
+                # They are right at 100 and 500 Hz.
+                rate_hz = [240, 300][(place + number) // 2 % 2]
+            velocities = velocities and options.readings != "encoder"
+            log, rng = f"{name}-{kind}", np.random.default_rng([options.seed, place, number])
+            truth[log] = make(os.path.join(options.out, log), name, kind, rate_hz, velocities, options.readings, rng)
+    write_truth(options.out, truth)
 
 
 if __name__ == "__main__":

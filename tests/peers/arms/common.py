@@ -32,16 +32,18 @@ def write_truth(folder: str, truth: dict) -> None:
     os.replace(path + ".new", path)
 
 
-def arguments(about: str, score: Callable[[str, str], None]) -> tuple[str, int]:
-    """Folder for the logs and seed; scores and ends where the command line asks for that."""
+def arguments(about: str, score: Callable[[str, str], None], **choices: list[str]) -> argparse.Namespace:
+    """`out`, the folder for the logs, `seed`, and one of each of `choices`, the first by default; scores and ends where the command line asks for that."""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", help="folder for the logs and truth.json")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--score", nargs=2, metavar=("LOGS", "ANSWERS"))
+    for name, values in choices.items():
+        parser.add_argument(f"--{name}", choices=values, default=values[0])
     options = parser.parse_args()
     if options.score:
         score(*options.score)
         raise SystemExit
     if not options.out:
         parser.error("expected --out or --score")
-    return options.out, options.seed
+    return options

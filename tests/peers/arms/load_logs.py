@@ -25,9 +25,9 @@ LOADS_KG = [None, 0.3, 1.0, 2.0, 4.0, -1.0]
 RATE_HZ, SECS = 200, 30.0
 
 
-def motion(model, rng: np.random.Generator, rate_hz: int = RATE_HZ, secs: float = SECS) -> list[np.ndarray]:
-    """Positions, rates and accelerations, a row a sample: sums of sines within 80 % of the ranges and half of the rates."""
-    time_secs = np.arange(0.0, secs, 1.0 / rate_hz)
+def motion(model, rng: np.random.Generator, rate_hz: int = RATE_HZ, secs: float = SECS, off_secs: np.ndarray | float = 0.0) -> list[np.ndarray]:
+    """Times, positions, rates and accelerations, a row a sample: sums of sines within 80 % of the ranges and half of the rates. Rows are `off_secs` off even ones."""
+    time_secs = np.arange(0.0, secs, 1.0 / rate_hz) + off_secs
     lower, upper = np.maximum(model.lowerPositionLimit, -2.5), np.minimum(model.upperPositionLimit, 2.5)
     omega = 2.0 * np.pi * np.array([0.06, 0.13, 0.25, 0.43])[:, None] * rng.uniform(0.75, 1.3, (4, model.nv))
     size, phase = rng.uniform(0.4, 1.0, omega.shape) / np.sqrt(omega), rng.uniform(0.0, 2.0 * np.pi, omega.shape)
@@ -142,7 +142,8 @@ def score(logs: str, answers: str) -> None:
 
 
 def main() -> None:
-    logs, seed = arguments(__doc__, score)
+    options = arguments(__doc__, score)
+    logs, seed = options.out, options.seed
     truth = {}
     for i, name in enumerate(arm_models.CATALOGUE):
         for k, load in enumerate(LOADS_KG):
