@@ -297,7 +297,8 @@ impl<'a> Prepared<'a> {
     }
 
     /// Standard deviation of measured less simulated torque in a window, N·m, from how well the motion is known. What rounding hides of a
-    /// position lasts while the joint is slow. It errs in the servo's torque, of this `stiffness`, as in the model's.
+    /// position lasts while the joint is slow. It errs in the servo's torque, of this `stiffness`, as in the model's. Neighbours share it, so that
+    /// halves of the readings cannot tell the error of acceleration where rounding is most of the noise.
     fn motion_noise(&self, joint: usize, stiffness: f64) -> f64 {
         let square = |values: &mut dyn Iterator<Item = f64>| {
             let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value * value, count + 1));
@@ -305,12 +306,14 @@ impl<'a> Prepared<'a> {
         };
         let of_moved = |moved: usize| {
             let own = |value: f64| if moved == joint { value } else { 0.0 };
-            let rounded = resolution(&self.log.position[moved]).map_or(0.0, |(step, _)| step * step / 12.0);
+            let rounded = resolution(&self.log.position[moved]).map_or(0.0, |(step, _)| step / 12.0_f64.sqrt());
+            let motion = &self.motion[moved];
+            let acceleration =
+                if rounded > 0.5 * motion.noise { motion.tick_acceleration_stddev } else { motion.acceleration_stddev };
             let reflected = own(self.reflected_inertia(joint) * self.gain(joint));
             let inertia = self.inertia[moved][joint].iter().map(|inertia| inertia + reflected);
             let gradient = self.stiffness[moved][joint].iter().map(|gradient| gradient + own(stiffness));
-            square(&mut { inertia }) * self.motion[moved].acceleration_stddev.powi(2)
-                + square(&mut { gradient }) * rounded
+            square(&mut { inertia }) * acceleration.powi(2) + square(&mut { gradient }) * rounded.powi(2)
         };
         (0..self.joints()).map(of_moved).sum::<f64>().sqrt()
     }

@@ -22,8 +22,10 @@ pub(crate) struct Smooth {
     pub(crate) acceleration: Vec<f64>,
     /// Standard deviation of the rate, rad/s: the median over the log.
     pub(crate) rate_stddev: f64,
-    /// Standard deviation of the mean acceleration of a window, rad/s².
+    /// Standard deviation of the mean acceleration of a window where errors of readings are independent, rad/s².
     pub(crate) acceleration_stddev: f64,
+    /// That of the acceleration of a tick as the smoother has it, rad/s²: the median over the log.
+    pub(crate) tick_acceleration_stddev: f64,
     /// Standard deviation of position readings, rad.
     pub(crate) noise: f64,
     /// ln of the density of all readings, but for a constant.
@@ -181,7 +183,7 @@ impl Readings<'_> {
             noise: (0.5 * spread.position).exp(),
             ..Smooth::default()
         };
-        let mut rates = Vec::with_capacity(count);
+        let (mut rates, mut accelerations) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for span in self.spans {
             let mut passes = Vec::with_capacity(span.len());
             smooth.log_likelihood += self.filter(span, spread, |predicted, before, state, covariance, step| {
@@ -207,9 +209,11 @@ impl Readings<'_> {
                 smooth.rate[tick] = state[1];
                 smooth.acceleration[tick] = state[2];
                 rates.push(covariance[(1, 1)].max(0.0));
+                accelerations.push(covariance[(2, 2)].max(0.0));
             }
         }
         smooth.rate_stddev = median(rates).sqrt();
+        smooth.tick_acceleration_stddev = median(accelerations).sqrt();
         smooth
     }
 }
