@@ -77,7 +77,8 @@ struct Batch<S, T> {
 /// the teachers of the latest observations are replayed through the history, which gives their exact likelihood, and weighted by the deterministic
 /// mixture of those teachers (AMIS; Cornuet, Marin, Mira and Robert 2012). The belief is the bridge q^(1 − φ) p^φ with the largest exponent φ
 /// that leaves the effective sample size asked for. φ = 1 is the posterior. Where the draws do not suffice for it, the belief stays as broad as
-/// the teacher for the rest of the way: a sampler's failure shows as width, not as certainty.
+/// the teacher for the rest of the way, and where they do not suffice for the teacher, as the mixture of teachers: a sampler's failure shows as width, not
+/// as certainty.
 #[derive(Clone, Debug)]
 pub struct BridgeFilter<S, T> {
     config: BridgeConfig,
@@ -219,13 +220,19 @@ impl<S: Clone + Send + Sync, T: Teacher> BridgeFilter<S, T> {
         };
         let size = |power: f64| log_effective_sample_size(logs(power).into_iter());
         let power = largest_power(self.config.effective, size);
-        let logs = logs(power);
+        // Where the latest teacher itself asks too much of the draws, as next to none of its own are possible, the belief stays nearer to the mixture.
+        let nearer = |share: f64| base.iter().map(move |b| if *b == f64::NEG_INFINITY { *b } else { share * b });
+        let logs: Vec<f64> = if power == 0.0 && size(0.0) < self.config.effective {
+            nearer(largest_power(self.config.effective, |share| log_effective_sample_size(nearer(share)))).collect()
+        } else {
+            logs(power)
+        };
         let sum = log_sum_exp(logs.iter().copied());
         self.weights = logs.iter().map(|l| (l - sum).exp()).collect();
         report.temperature = power;
         report.particles = self.weights.len();
         report.effective_sample_size_before = size(1.0);
-        report.effective_sample_size = size(power);
+        report.effective_sample_size = log_effective_sample_size(logs.iter().copied());
         report.acceptance = self.batches[latest].members.len() as f64 / self.config.draws as f64;
         report.proposed = self.batches[latest].members.len();
         let before =

@@ -346,6 +346,25 @@ fn what_the_latest_teacher_excludes_stays_possible() {
 }
 
 #[test]
+fn a_teacher_that_is_far_from_all_draws_does_not_leave_a_few_of_them() {
+    // The last teacher is narrow, six standard deviations off, and next to nothing that it suggests is possible: its weights of the others' draws vary by
+    // many nats.
+    let teacher = |line: &Line| match line.readings.len() {
+        4 => Guess { impossible: 1.0 - 1e-9, ..Guess::wrong(line, 6.0, 0.3, 0.0) },
+        _ => Guess::wrong(line, 0.0, 6.0, 0.0),
+    };
+    // The draws do not suffice for the posterior either.
+    let config = BridgeConfig { draws: 400, kept: 3, effective: 100.0 };
+    let found = episodes(&Setting { q: 0.2, steps: 4, config, teacher: &teacher }, 10);
+    for f in &found {
+        let report = f.last();
+        assert!(report.temperature == 0.0 && report.proposed == 0, "{report:?}");
+        assert!((99.9..100.1).contains(&report.effective_sample_size), "{report:?}");
+        assert!((f.belief.effective_sample_size() - report.effective_sample_size).abs() < 1e-6);
+    }
+}
+
+#[test]
 fn settings_outside_their_limits_are_refused() {
     let good = BridgeConfig::default();
     assert_eq!(good.validate(), Ok(()));
