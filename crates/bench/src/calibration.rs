@@ -1,7 +1,7 @@
 //! How far a belief can be trusted: fresh worlds, played with the agent, and what prior, network and filter say at each step.
 //!
 //! Everything is about worlds: an interval of a figure is a bootstrap over them, because the steps of an episode share one world. The filter is
-//! asked in the very episode that its agent plays. Prior and network, on the same history, give as many draws as the filter has effective ones.
+//! asked in the very episode that its agent plays. Prior and network, on the same history, give as many draws as the filter aims at.
 
 mod episode;
 mod figures;
@@ -180,9 +180,8 @@ pub fn run(root: &Path, task: &Task, out: &Path, note: impl Fn(&str) + Sync) -> 
     let summary = summary::summary(&played, &provenance);
     whole_file::write(&out.join("calibration.json"), pretty(&summary).as_bytes(), Existing::Replace)?;
     whole_file::write(&out.join("calibration.md"), table(&summary).as_bytes(), Existing::Replace)?;
-    figures::save(&summary, out)?;
     save_starts(&problem, &network, &played, &provenance, out)?;
-    Ok(summary)
+    figures::save(&summary, out).map(|()| summary)
 }
 
 /// The episodes as arrays, for `training/coverage.py`.

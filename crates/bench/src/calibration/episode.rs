@@ -9,13 +9,16 @@ use belief::Particles;
 use physics_model::config::ObstacleMobility;
 use pomdp::{Purpose, Replay as _, Rng, Seed, Teacher as _};
 use prior_training::starts;
-use push_task::{Action, Observation, Particle};
+use push_task::{Action, Coordinates, Observation, Particle};
 use rand::RngExt as _;
 use scenario::Problem;
 use serde::{Deserialize, Serialize};
 
 use super::reference::{Ruler, ruler};
 use super::{External, NO_DRAWN};
+
+/// Effective draws of a belief that is well.
+pub(super) const USUAL_DRAWS: f64 = 50.0;
 
 /// Numbers whose ranks are taken: names, and whether only hypotheses of the true shape have them.
 pub(super) const NUMBERS: [(&str, bool); 8] = [
@@ -41,7 +44,7 @@ pub struct Row {
     /// See `shape`.
     pub obstacle_class: f64,
     /// Rank of the true value among n draws and itself, (n P(number < true one) + u (n P(equal) + 1)) / (n + 1) with u uniform and n the effective size, for
-    /// each of [`NUMBERS`]: uniform for a calibrated belief, however few the draws (Talts et al. 2018). Null where the shape has no such number.
+    /// each of [`NUMBERS`]: uniform for a calibrated belief, however few the draws (Talts et al. 2018), nearly so where they have weights. Null where the shape has no such number.
     pub ranks: Vec<Option<f64>>,
     /// Mean of ln mass minus the true one.
     pub log_mass_error: f64,
@@ -99,6 +102,28 @@ struct Onlooker {
     transitions: Vec<usize>,
     exponents: Vec<f64>,
     rng: Rng,
+}
+
+impl Onlooker {
+    fn new(rng: Rng) -> Self {
+        let (rows, steps, transitions, exponents) = Default::default();
+        Self { truth: None, rows, steps, transitions, exponents, rng }
+    }
+
+    /// The episode as [`starts`] have it; empty where the start is outside the distribution of `coordinates`. `first`: observation, and joints, rad.
+    fn values(
+        &self,
+        problem: &Problem,
+        coordinates: &Coordinates<'_>,
+        start: &Particle,
+        first: (&Observation, &[f64]),
+        seed: Seed,
+    ) -> Vec<f32> {
+        let steps = std::iter::once((None, first.0.clone(), first.1));
+        let later = self.steps.iter().map(|(action, seen, joints)| (Some(*action), seen.clone(), &joints[..]));
+        let mut rng = seed.stream(Purpose::Statistics, 2);
+        starts::values(problem, coordinates, start, &mut rng, steps.chain(later)).unwrap_or_default()
+    }
 }
 
 impl Watcher for Onlooker {
@@ -185,14 +210,7 @@ fn played<W: Acted>(
     follows: bool,
     reference: Option<usize>,
 ) -> Result<World> {
-    let mut onlooker = Onlooker {
-        truth: None,
-        rows: Vec::new(),
-        steps: Vec::new(),
-        transitions: Vec::new(),
-        exponents: Vec::new(),
-        rng: seed.stream(Purpose::Statistics, 0),
-    };
+    let mut onlooker = Onlooker::new(seed.stream(Purpose::Statistics, 0));
     #[expect(clippy::disallowed_methods, reason = "a benchmark measures time")]
     let started = std::time::Instant::now();
     let mut agent = Agent::new(problem, Method::Mixture, Some(network))?;
@@ -202,7 +220,8 @@ fn played<W: Acted>(
         played => played?,
     };
     let seconds = started.elapsed().as_secs_f64() / episode.steps.len().max(1) as f64;
-    let (Some((observation, joints_rad)), Some(start), None) = (world.first, onlooker.truth, &episode.failure) else {
+    let (Some((observation, joints_rad)), Some(start), None) = (world.first, onlooker.truth.take(), &episode.failure)
+    else {
         return Ok(failed(episode.failure.unwrap_or_else(|| NO_DRAWN.into())));
     };
     if !follows {
@@ -216,12 +235,9 @@ fn played<W: Acted>(
     network.observe(&problem.model, None, &observation, &joints_rad);
     let mut history = agent::history(problem, Some(&network), &observation);
     let coordinates = history.start_coordinates().with_distribution(network.distribution());
-    let steps = std::iter::once((None, observation.clone(), joints_rad.as_slice()));
-    let steps =
-        steps.chain(onlooker.steps.iter().map(|(action, seen, joints)| (Some(*action), seen.clone(), &joints[..])));
-    let values = starts::values(problem, &coordinates, &start, &mut seed.stream(Purpose::Statistics, 2), steps);
+    let values = onlooker.values(problem, &coordinates, &start, (&observation, &joints_rad), seed);
     let prior = Estimate::prior(&history);
-    // As many as the filter has effective ones.
+    // As many as the filter aims at.
     let count = problem.scenario.belief.bridge.effective.round() as usize;
     let mut draws = |estimate: &Estimate<'_>| -> Result<Row> {
         let drawn = (0..10 * count).filter_map(|_| {
@@ -244,14 +260,12 @@ fn played<W: Acted>(
     let estimate = Estimate::network(&history, &network);
     let asked = reference.map(|particles| ruler(particles, &history, &estimate, &start, &mut rng));
     let (ruler, ruler_failure) = ruled(asked, problem.scenario.world.obstacle_mobility);
-    let touched =
-        |row: &agent::StepRecord| row.large_force || row.obstacle_touched || moved(&row.observation, &observation);
     Ok(World {
         reason: episode.reason.name().into(),
         failure: None,
         discounted_return: episode.discounted_return,
         has_obstacle: start.theta.obstacle.is_some(),
-        first_contact: episode.steps.iter().position(touched).map(|index| index + 1),
+        first_contact: first_contact(&episode, &observation),
         filter: onlooker.rows,
         prior: of_prior,
         network: of_network,
@@ -260,7 +274,7 @@ fn played<W: Acted>(
         seconds,
         ruler,
         ruler_failure,
-        values: values.unwrap_or_default(),
+        values,
     })
 }
 
@@ -277,6 +291,12 @@ fn ruled(asked: Option<Result<Ruler>>, mobility: ObstacleMobility) -> (Option<Ru
         Some(Err(error)) => (None, Some(format!("{error:#}"))),
         None => (None, None),
     }
+}
+
+/// Step of the first contact of the tool with the object, from 1.
+fn first_contact(episode: &Episode, first: &Observation) -> Option<usize> {
+    let touched = |row: &agent::StepRecord| row.large_force || row.obstacle_touched || moved(&row.observation, first);
+    episode.steps.iter().position(touched).map(|index| index + 1)
 }
 
 /// Whether the object is seen 1 cm or more from where it was first seen: five standard deviations.
@@ -332,8 +352,8 @@ pub(super) fn row(belief: &Particles<Particle>, truth: &Particle, rng: &mut Rng)
     };
     let (log_mass_error, mass_score) = gaussian(&|p| p.theta.object.mass_kg.ln());
     let (friction_error, friction_score) = gaussian(&|p| p.theta.object.friction);
-    // The mass of a class that no draw has is at most a draw's.
-    let floor = 0.5 / effective;
+    // The mass of a class that no draw has is at most a draw's. A belief that is down to few draws is not forgiven for it.
+    let floor = 0.5 / effective.max(USUAL_DRAWS);
     let obstacle_m = truth.state.obstacle.as_ref().and_then(|body| {
         let with = share(&|p| p.state.obstacle.is_some());
         let off = |axis: usize| {

@@ -4,7 +4,7 @@ use pomdp::{Purpose, Rng, Seed};
 use rand::RngExt as _;
 use serde_json::{Map, Value, json};
 
-use super::episode::{NUMBERS, Row, World};
+use super::episode::{NUMBERS, Row, USUAL_DRAWS, World};
 use super::reference::Ruler;
 
 /// Steps that are reported; a world that has ended counts with its last belief.
@@ -120,8 +120,11 @@ fn figures_of_a_row() -> Vec<(String, Figure)> {
         ("obstacle_brier".into(), Box::new(move |w, row| Some((row.obstacle - truth(w)).powi(2)))),
         ("obstacle_brier_without_obstacle".into(), Box::new(|w, row| (!w.has_obstacle).then(|| row.obstacle.powi(2)))),
         // A probability of 0 is one that no draw has.
-        ("shape_nats".into(), Box::new(|_, row| Some(-row.shape.max(0.5 / row.effective).ln()))),
-        ("obstacle_class_nats".into(), Box::new(|_, row| Some(-row.obstacle_class.max(0.5 / row.effective).ln()))),
+        ("shape_nats".into(), Box::new(|_, row| Some(-row.shape.max(0.5 / row.effective.max(USUAL_DRAWS)).ln()))),
+        (
+            "obstacle_class_nats".into(),
+            Box::new(|_, row| Some(-row.obstacle_class.max(0.5 / row.effective.max(USUAL_DRAWS)).ln())),
+        ),
         ("effective".into(), Box::new(|_, row| Some(row.effective))),
         ("log_mass_error".into(), Box::new(|_, row| Some(row.log_mass_error.abs()))),
         ("friction_error".into(), Box::new(|_, row| Some(row.friction_error.abs()))),
