@@ -299,14 +299,14 @@ impl<'a> Prepared<'a> {
     /// Standard deviation of measured less simulated torque in a window, N·m, from how well the motion is known. What rounding hides of a
     /// position lasts while the joint is slow. It errs in the servo's torque, of this `stiffness`, as in the model's. Neighbours share it, so that
     /// halves of the readings cannot tell the error of acceleration where rounding is most of the noise.
-    fn motion_noise(&self, joint: usize, stiffness: f64) -> f64 {
+    fn motion_noise(&self, joint: usize, stiffness: f64, rounding: &[f64]) -> f64 {
         let square = |values: &mut dyn Iterator<Item = f64>| {
             let (sum, count) = values.fold((0.0, 0), |(sum, count), value| (sum + value * value, count + 1));
             sum / f64::from(count.max(1))
         };
         let of_moved = |moved: usize| {
             let own = |value: f64| if moved == joint { value } else { 0.0 };
-            let rounded = resolution(&self.log.position[moved]).map_or(0.0, |(step, _)| step / 12.0_f64.sqrt());
+            let rounded = rounding[moved];
             let motion = &self.motion[moved];
             let acceleration =
                 if rounded > 0.5 * motion.noise { motion.tick_acceleration_stddev } else { motion.acceleration_stddev };
@@ -324,13 +324,16 @@ impl<'a> Prepared<'a> {
         /// their range, is no gap that matters.
         const LEAST: f64 = 1e-3;
         let long = self.windows.first().map_or(1, Range::len) as f64;
+        // Of each joint's positions, rad.
+        let rounding: Vec<f64> =
+            self.log.position.iter().map(|v| resolution(v).map_or(0.0, |(step, _)| step / 12.0_f64.sqrt())).collect();
         self.noise = (0..self.joints())
             .map(|joint| {
                 if let Some(servo) = self.log.header.servo.as_ref().filter(|_| self.servo_damping.is_some()) {
                     // The error of position is read with the noise of positions.
                     let stiffness = servo.stiffness_nmprad.of(joint).unwrap_or(0.0);
                     return (stiffness * self.motion[joint].noise / long.sqrt())
-                        .hypot(self.motion_noise(joint, stiffness))
+                        .hypot(self.motion_noise(joint, stiffness, &rounding))
                         .max(LEAST * self.scale[joint]);
                 }
                 let given = self.log.header.noise.joint_torque_nm.as_ref().and_then(|numbers| numbers.of(joint));
@@ -345,7 +348,7 @@ impl<'a> Prepared<'a> {
                     }
                 };
                 let read = (read / long.sqrt()).max(self.rounding(joint));
-                read.hypot(self.motion_noise(joint, 0.0)).max(LEAST * self.scale[joint])
+                read.hypot(self.motion_noise(joint, 0.0, &rounding)).max(LEAST * self.scale[joint])
             })
             .collect();
     }
