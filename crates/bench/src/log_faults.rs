@@ -36,7 +36,7 @@ enum Fault {
     OneTurned,
     /// Times of arrival: up to a third of a period late.
     Jitter,
-    /// Times 1 % too long.
+    /// Times too long by [`STRETCH`].
     Stretched,
     /// An episode twice.
     Repeated,
@@ -193,7 +193,7 @@ fn name(folder: &Path) -> String {
 fn one(fault: &Fault, log: &Log, good: &Check) -> Option<[bool; 3]> {
     let (spoilt, kind) = spoil(fault, log)?;
     let found = check(&spoilt, None);
-    let visible = visible(fault, good, &found);
+    let visible = visible(fault, log, good, &found);
     let suspicion = found.suspicions.iter().find(|suspicion| suspicion.kind == kind);
     let mended = suspicion.is_some_and(|suspicion| {
         suspicion.readings.first().is_some_and(|reading| near(&check(&reading.apply(&spoilt), None), good))
@@ -212,10 +212,12 @@ const SAME: f64 = 0.3;
 /// What a fault has to change in the cost of poses, and in the cosine of forces, to be seen.
 const SEEN: f64 = 1.0;
 const SEEN_COSINE: f64 = 0.6;
+/// By which share times are too long.
+const STRETCH: f64 = 0.01;
 /// Share of onsets at which a tool touches the object where it tells of one episode.
 const MET: f64 = 0.8;
 
-fn visible(fault: &Fault, good: &Check, spoilt: &Check) -> bool {
+fn visible(fault: &Fault, log: &Log, good: &Check, spoilt: &Check) -> bool {
     let rises = spoilt.fit.cost() - good.fit.cost() >= SEEN;
     let forces = good.forces.filter(|forces| forces.cosine > SEEN_COSINE);
     match fault {
@@ -224,11 +226,17 @@ fn visible(fault: &Fault, good: &Check, spoilt: &Check) -> bool {
         }
         // What rolls needs any small force, so that a unit that makes forces smaller is not seen.
         Fault::Meant(Reading::ForceScaled(factor), _) => {
-            forces.is_some_and(|forces| *factor > 1.0 || (0.5..2.0).contains(&forces.strength))
+            forces.is_some_and(|forces| *factor > 1.0 || !good.may_roll && (0.5..2.0).contains(&forces.strength))
         }
         Fault::Meant(Reading::TorqueAbout(_), _) => forces.is_some() && has(spoilt, "wrist_tx_nm"),
         Fault::Meant(Reading::AddedMassScaled(_), _) => true,
         Fault::Meant(..) => rises,
+        // Motion has to tell when it was, by more than its noise.
+        Fault::Jitter => spoilt.followed.is_some_and(|followed| followed.is_told()),
+        // The sensors' own rate has to be the header's, and to be known that well.
+        Fault::Stretched => good.clock.as_ref().is_some_and(|clock| {
+            clock.margin() < STRETCH && (clock.period_secs / log.header.period_secs - 1.0).abs() < STRETCH
+        }),
         // The tool has to tell where the object is.
         Fault::OneTurned => good.fit.touch.is_some_and(|touch| touch.met > MET),
         Fault::DeadSensor
@@ -236,8 +244,6 @@ fn visible(fault: &Fault, good: &Check, spoilt: &Check) -> bool {
         | Fault::Clipped
         | Fault::DeadAxis
         | Fault::Away
-        | Fault::Jitter
-        | Fault::Stretched
         | Fault::Repeated
         | Fault::GravityInG => true,
     }
@@ -294,7 +300,7 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
             Kind::Jitter
         }
         Fault::Stretched => {
-            spoilt.episodes.iter_mut().for_each(|episode| episode.time_secs.iter_mut().for_each(|secs| *secs *= 1.01));
+            spoilt.episodes.iter_mut().for_each(|episode| episode.time_secs.iter_mut().for_each(|secs| *secs *= 1.0 + STRETCH));
             Kind::Rate
         }
         Fault::Repeated => {

@@ -6,6 +6,7 @@
 //! and after these three is free of their noise: the slope is that of instrumental variables (Wright 1928).
 
 use measured_log::{Axis, Channel, Episode, Log};
+use serde::Serialize;
 
 /// Readings that stand in a row.
 const READINGS: usize = 5;
@@ -13,15 +14,21 @@ const READINGS: usize = 5;
 const SURE: f64 = 4.0;
 
 /// Which share of the unevenness of its stamps a motion follows.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Followed {
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Followed {
     /// 1 where places were measured when the stamps say, 0 where at even distances.
-    pub(crate) share: f64,
+    pub share: f64,
     /// Standard error.
-    pub(crate) error: f64,
+    pub error: f64,
 }
 
 impl Followed {
+    /// Whether the two can be told apart: something moves fast enough beside its noise.
+    #[must_use]
+    pub fn is_told(&self) -> bool {
+        SURE * self.error < 0.5
+    }
+
     /// Whether the motion follows less than half.
     pub(crate) fn is_of_arrival(&self) -> bool {
         self.share + SURE * self.error < 0.5

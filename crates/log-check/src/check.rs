@@ -6,6 +6,7 @@ use physics_model::robot::{Robot, ToolShape};
 use serde::Serialize;
 
 use crate::arm;
+use crate::arrival::{self, Followed};
 use crate::geometry::{self, Fit, Tool};
 use crate::motion::Motions;
 use crate::sensors::{self, Clock, Sensor};
@@ -55,6 +56,10 @@ pub struct Check {
     pub fit: Fit,
     /// What forces show.
     pub forces: Option<Forces>,
+    /// Whether motion follows the unevenness of stamps; `None` where nothing moves, or stamps are even.
+    pub followed: Option<Followed>,
+    /// Whether the object may roll: what rolls is pushed with any small force.
+    pub may_roll: bool,
     /// What looks wrong.
     pub suspicions: Vec<Suspicion>,
     /// What this log cannot show.
@@ -72,13 +77,14 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
     let width_m = 2.0 * Solid::new(&log.header.object.shape).half_m().into_iter().fold(f64::INFINITY, f64::min);
     let motions = Motions::new(log, width_m, |episode, row| arm::tool_m(log, arm, episode, row));
     let fit = geometry::fit(None, log, &tool, &motions);
+    let (followed, may_roll) = (arrival::stamps_followed(log), motions.may_roll(&log.header.object.shape));
     let (geometry, mut not_told) = of_geometry(log, &tool, &motions, &fit);
     if geometry.is_none() {
         suspicions.extend(geometry::astray(log, &tool, &motions).map(of_astray));
     }
     let meant = geometry.as_ref().and_then(|suspicion| suspicion.readings.first().copied());
     let mass_kg = log.header.object.mass_kg.mean();
-    suspicions.extend(sensors::suspicions(log, &sensors, clock.as_ref(), &|index, secs, force_n| {
+    suspicions.extend(sensors::suspicions(log, &sensors, clock.as_ref(), followed.as_ref(), &|index, secs, force_n| {
         motions.is_blow(index, secs, force_n, mass_kg)
     }));
     suspicions.extend(geometry);
@@ -88,7 +94,7 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
     let axes = of_axes(&contacts, forces);
     let turned = axes.is_some();
     suspicions.extend(axes);
-    suspicions.extend(of_strength(forces, motions.may_roll(&log.header.object.shape)));
+    suspicions.extend(of_strength(forces, may_roll));
     if !turned {
         suspicions.extend(contacts.lever().and_then(|lever| of_lever(lever, reach_m)));
     }
@@ -99,7 +105,7 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
         );
     }
     suspicions.sort_by_key(|suspicion| suspicion.kind);
-    Check { sensors, clock, fit, forces, suspicions, not_told }
+    Check { sensors, clock, fit, forces, followed, may_roll, suspicions, not_told }
 }
 
 /// What touches: the ball of the log, or what of the hand can touch.

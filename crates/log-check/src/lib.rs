@@ -33,6 +33,7 @@ mod suspicion;
 mod wrench;
 
 pub use align::{Alignment, Correction, Estimate, align};
+pub use arrival::Followed;
 pub use check::{Check, check};
 pub use geometry::{Fit, Rest, Touch};
 pub use reading::Reading;

@@ -3,7 +3,7 @@
 use measured_log::{Axis, Channel, Component, Episode, Log};
 use serde::Serialize;
 
-use crate::arrival;
+use crate::arrival::Followed;
 use crate::clipped::{clipped, dead_axes};
 use crate::suspicion::{Kind, Suspicion};
 
@@ -62,6 +62,14 @@ pub struct Clock {
     pub jitter_secs: f64,
     /// Distances in which readings were lost.
     pub gaps: usize,
+}
+
+impl Clock {
+    /// Share by which its rate may differ from the header's.
+    #[must_use]
+    pub fn margin(&self) -> f64 {
+        RATE_SHARE + 4.0 * self.error_secs / self.period_secs
+    }
 }
 
 /// Groups of columns that a sensor gives together.
@@ -176,6 +184,7 @@ pub(crate) fn suspicions(
     log: &Log,
     sensors: &[Sensor],
     clock: Option<&Clock>,
+    followed: Option<&Followed>,
     blow: &dyn Fn(usize, f64, f64) -> bool,
 ) -> Vec<Suspicion> {
     let mut all: Vec<Suspicion> = dead(log).into_iter().map(|group| {
@@ -193,17 +202,17 @@ pub(crate) fn suspicions(
     }).collect();
     all.extend(dead_axes(log));
     all.extend(clipped(log));
-    all.extend(clock.and_then(|clock| of_clock(log, clock)));
+    all.extend(clock.and_then(|clock| of_clock(log, clock, followed)));
     all.extend(groups(log).iter().filter_map(|group| spikes(log, group, blow)));
     all.extend(repeated(log));
     all
 }
 
-fn of_clock(log: &Log, clock: &Clock) -> Option<Suspicion> {
+fn of_clock(log: &Log, clock: &Clock, followed: Option<&Followed>) -> Option<Suspicion> {
     let period_secs = log.header.period_secs;
     let ms = |secs: f64| 1e3 * secs;
     if clock.jitter_secs > JITTER_SHARE * clock.period_secs
-        && let Some(followed) = arrival::stamps_followed(log).filter(arrival::Followed::is_of_arrival)
+        && let Some(followed) = followed.filter(|followed| followed.is_of_arrival())
     {
         let found = format!(
             "Readings come every {:.2} ms, give or take {:.2} ms, and motion follows {:.0} ± {:.0} % of that unevenness: times are those of arrival, not of \
@@ -231,8 +240,7 @@ fn of_clock(log: &Log, clock: &Clock) -> Option<Suspicion> {
     }
     // Several readings a tick, and several ticks a reading, are allowed.
     let whole = if off > 1.0 { off / off.round() } else { off * off.recip().round() };
-    let margin = RATE_SHARE + 4.0 * clock.error_secs / clock.period_secs;
-    ((whole - 1.0).abs() > margin && (off - 1.0).abs() < NEAR_RATE).then(|| {
+    ((whole - 1.0).abs() > clock.margin() && (off - 1.0).abs() < NEAR_RATE).then(|| {
         let found = format!(
             "{} comes every {:.3} ms, period_secs says {:.3} ms, and no sensor comes nearer.",
             clock.column,
