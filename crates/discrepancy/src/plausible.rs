@@ -64,7 +64,7 @@ pub(crate) fn check(
             if height_m.abs() > 2.0 * size_m + 0.05 + unsure_m {
                 let [size_m, table_m, height_m] = [size_m, table_m, height_m].map(|length| units.factor("m") * length);
                 return refuse(format!(
-                    "episode {}: expected an object of {size_m} m that begins on the table at table.height_m = {table_m}, found its centre {height_m} m above it: are \
+                    "episode {}: expected an object of {size_m:.4} m that begins on the table at table.height_m = {table_m}, found its centre {height_m:.3} m above it: are \
                      positions in m, and in the same frame?",
                     episode.id
                 ));
