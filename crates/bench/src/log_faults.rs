@@ -231,8 +231,10 @@ fn visible(fault: &Fault, log: &Log, good: &Check, spoilt: &Check) -> bool {
         Fault::Meant(Reading::TorqueAbout(_), _) => forces.is_some() && has(spoilt, "wrist_tx_nm"),
         Fault::Meant(Reading::AddedMassScaled(_), _) => true,
         Fault::Meant(..) => rises,
-        // Motion has to tell when it was, by more than its noise.
-        Fault::Jitter => spoilt.followed.is_some_and(|followed| followed.is_told()),
+        // Motion has to tell when it was, by more than its noise; it follows the unevenness that the good log has.
+        Fault::Jitter => spoilt.followed.zip(good.clock.as_ref().zip(spoilt.clock.as_ref())).is_some_and(
+            |(followed, (own, all))| followed.tells((own.jitter_secs / all.jitter_secs).powi(2).min(1.0)),
+        ),
         // The sensors' own rate has to be the header's, and to be known that well.
         Fault::Stretched => good.clock.as_ref().is_some_and(|clock| {
             clock.margin() < STRETCH && (clock.period_secs / log.header.period_secs - 1.0).abs() < STRETCH

@@ -12,6 +12,8 @@ use serde::Serialize;
 const READINGS: usize = 5;
 /// Standard errors by which a share is below one half.
 const SURE: f64 = 4.0;
+/// Standard errors that a normal variable is below in 19 of 20 cases.
+const NINETEEN_IN_TWENTY: f64 = 1.645;
 
 /// Which share of the unevenness of its stamps a motion follows.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -23,10 +25,10 @@ pub struct Followed {
 }
 
 impl Followed {
-    /// Whether the two can be told apart: something moves fast enough beside its noise.
+    /// Whether a motion that truly follows this share would be found to follow less than half, in 19 of 20 logs with this error.
     #[must_use]
-    pub fn is_told(&self) -> bool {
-        SURE * self.error < 0.5
+    pub fn tells(&self, share: f64) -> bool {
+        share + (SURE + NINETEEN_IN_TWENTY) * self.error < 0.5
     }
 
     /// Whether the motion follows less than half.

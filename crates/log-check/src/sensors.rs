@@ -11,6 +11,8 @@ use crate::suspicion::{Kind, Suspicion};
 pub(crate) const DEAD_ROWS: usize = 50;
 /// A spike is this many times larger than what its neighbours, and nine in ten of all readings, differ from each other by.
 const SPIKE: f64 = 8.0;
+/// Forces before and after a reading are others where they differ by more than what nine in ten neighbours do, so many times: of noise alone that is 8 standard errors.
+const CHANGES: f64 = 3.0;
 /// Rows, and seconds, in which a reading can be away and come back; what moves takes longer.
 const MOST_AWAY: usize = 5;
 const AWAY_SECS: f64 = 0.1;
@@ -330,7 +332,10 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
                     [(0, 1), (1, 2), (3, 4), (4, 5)].map(|(a, b)| if a < 2 { (a, b) } else { (a + burst, b + burst) });
                 let near = near.map(|(a, b)| (value(b) - value(a)).abs());
                 let limit = SPIKE * near.into_iter().fold(usual, f64::max);
-                if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs, value(3).abs()))) {
+                let mean = |from: usize| (from..from + 3).map(value).sum::<f64>() / 3.0;
+                // A contact that begins or ends here may do so with a blow: other forces go on than came before.
+                let meets = || (mean(3 + burst) - mean(0)).abs() > CHANGES * usual || blow(index, secs, value(3).abs());
+                if alone > limit && (!forces || (value(3).abs() > beyond && !meets())) {
                     far.push((alone / usual, episode.id, secs, *channel, value(3), burst));
                 }
             }
