@@ -11,10 +11,6 @@ use crate::suspicion::{Kind, Suspicion};
 pub(crate) const DEAD_ROWS: usize = 50;
 /// A spike is this many times larger than what its neighbours, and nine in ten of all readings, differ from each other by.
 const SPIKE: f64 = 8.0;
-/// A contact begins or ends where a force is this many times what nine in ten neighbours differ by, of noise alone 8 standard errors, and on the other side of the
-/// reading no more than this share of that.
-const CONTACT: f64 = 3.0;
-const NO_CONTACT: f64 = 0.1;
 /// Rows, and seconds, in which a reading can be away and come back; what moves takes longer.
 const MOST_AWAY: usize = 5;
 const AWAY_SECS: f64 = 0.1;
@@ -189,7 +185,7 @@ pub(crate) fn suspicions(
     sensors: &[Sensor],
     clock: Option<&Clock>,
     followed: Option<&Followed>,
-    blow: &dyn Fn(usize, f64, f64, bool) -> bool,
+    blow: &dyn Fn(usize, f64, f64) -> bool,
 ) -> Vec<Suspicion> {
     let mut all: Vec<Suspicion> = dead(log).into_iter().map(|group| {
         let column = group[0].name();
@@ -294,8 +290,8 @@ pub fn without_dead(log: &Log) -> Option<Log> {
 /// Single readings, and of places up to [`MOST_AWAY`] in a row, that stand out from those before and after by far more than these from each other.
 ///
 /// Of places, which cannot go there and back; of forces only far beyond all others, and not where they may be a blow, which is as short. `blow`: whether one is
-/// possible in an episode, by its index, at a time, s, with a force, N, where forces begin or end or not.
-fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64, bool) -> bool) -> Option<Suspicion> {
+/// possible in an episode, by its index, at a time, s, with a force, N.
+fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) -> Option<Suspicion> {
     let forces = matches!(group[0], Channel::WristForce(_));
     if !forces && !matches!(group[0], Channel::Tool(_) | Channel::Joint(_) | Channel::ObjectPosition(_)) {
         return None;
@@ -334,9 +330,7 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64, bool) -> 
                     [(0, 1), (1, 2), (3, 4), (4, 5)].map(|(a, b)| if a < 2 { (a, b) } else { (a + burst, b + burst) });
                 let near = near.map(|(a, b)| (value(b) - value(a)).abs());
                 let limit = SPIKE * near.into_iter().fold(usual, f64::max);
-                let mean = |from: usize| (from..from + 3).map(value).sum::<f64>() / 3.0;
-                let meets = || blow(index, secs, value(3).abs(), begins_or_ends([mean(0), mean(3 + burst)], usual));
-                if alone > limit && (!forces || (value(3).abs() > beyond && !meets())) {
+                if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs, value(3).abs()))) {
                     far.push((alone / usual, episode.id, secs, *channel, value(3), burst));
                 }
             }
@@ -352,12 +346,6 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64, bool) -> 
     let mut suspicion = Suspicion::new(Kind::Outliers, found, "Leave such cells empty.");
     suspicion.shown_at = Some((worst.1, worst.2));
     Some(suspicion)
-}
-
-/// Whether a contact begins or ends between two forces, which it may do with a blow.
-fn begins_or_ends(forces_n: [f64; 2], usual_n: f64) -> bool {
-    let [small, large] = if forces_n[0].abs() < forces_n[1].abs() { forces_n } else { [forces_n[1], forces_n[0]] };
-    large.abs() > CONTACT * usual_n && small.abs() < NO_CONTACT * large.abs()
 }
 
 /// Episodes that are copies of earlier ones.
@@ -396,18 +384,4 @@ fn repeated(log: &Log) -> Option<Suspicion> {
         found,
         "Take the copies out: they would count twice, and be fitted and held out at once.",
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_contact_begins_or_ends_where_one_side_has_no_force() {
-        for (forces_n, is) in
-            [([0.03, -4.7], true), ([4.7, 0.03], true), ([4.0, 4.7], false), ([0.1, -0.02], false), ([-4.0, 4.7], false)]
-        {
-            assert_eq!(begins_or_ends(forces_n, 0.2), is, "{forces_n:?}");
-        }
-    }
 }
