@@ -40,9 +40,6 @@ pub struct Truth {
     pub outside: Vec<serde_json::Value>,
     /// Mean square of what all of these change, in that of noise.
     pub detectable: Option<f64>,
-    /// The same beside the best that its engine does without them, with other masses, frictions and clocks; `None` where the log does not say.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub after_retuning: Option<f64>,
     /// Effects that its engine has by nature, such as the anisotropy of a pyramidal friction cone: neither right nor wrong.
     #[serde(default)]
     pub natural: Vec<String>,
@@ -100,18 +97,12 @@ impl Truth {
     /// What a right answer is. An effect that changes less than noise is none, and so is what is re-tuned.
     #[must_use]
     pub fn kind(&self) -> Kind {
-        let shows = self.shown() >= DETECTABLE;
+        let shows = self.detectable.is_some_and(|size| size >= DETECTABLE);
         match (self.effects.iter().all(Named::is_re_tuned), self.outside.is_empty()) {
             (_, false) if shows => Kind::Outside,
             (false, true) if shows => Kind::Effect,
             _ => Kind::None,
         }
-    }
-
-    /// Mean square, in that of noise, of what no mass, friction or clock makes up for; of all that changes where that is not known.
-    #[must_use]
-    pub fn shown(&self) -> f64 {
-        self.after_retuning.or(self.detectable).unwrap_or(0.0)
     }
 
     /// Whether a name is one of what is hidden.
@@ -310,7 +301,6 @@ fn read_own(folder: &Path) -> Result<Vec<Example>> {
             outside: own.spec.unknown.iter().map(|unknown| serde_json::Value::from(unknown.name())).collect(),
             // They begin where they show.
             detectable: Some(f64::MAX),
-            after_retuning: None,
             natural: Vec::new(),
             designed: own.spec.actions == Actions::Designed,
             episodes: OWN_EPISODES,
@@ -359,7 +349,6 @@ pub(crate) mod tests {
             effects,
             outside: Vec::new(),
             detectable: Some(if effect { 10.0 } else { 0.0 }),
-            after_retuning: None,
             natural: Vec::new(),
             designed: true,
             episodes: 30,
@@ -407,10 +396,6 @@ pub(crate) mod tests {
         assert_eq!(hidden.kind(), Kind::Effect);
         hidden.detectable = Some(0.5);
         assert_eq!(hidden.kind(), Kind::None);
-        // Another friction does the same.
-        (hidden.detectable, hidden.after_retuning) = (Some(50.0), Some(0.2));
-        assert_eq!(hidden.kind(), Kind::None);
-        hidden.after_retuning = None;
         hidden = Truth {
             detectable: Some(50.0),
             effects: vec![Named { name: "contact_compliance".into(), parameters: BTreeMap::new() }],

@@ -88,7 +88,7 @@ pub fn judge(judged: &[Judgement]) -> Judged {
                 counts.first += u32::from(right);
                 let compared = example.compares_truth();
                 counts.compared += u32::from(compared);
-                let size = example.truth.shown();
+                let size = example.truth.detectable.unwrap_or(0.0);
                 let bin = &mut counts.by_size[EDGES.iter().filter(|edge| size >= **edge).count()];
                 let named = right && verdict == Verdict::Effect;
                 *bin = [bin[0] + 1, bin[1] + u32::from(compared), bin[2] + u32::from(named)];

@@ -23,7 +23,6 @@ import numpy as np
 
 import engines
 import hidden
-import retune
 import scene as wide
 import sensors
 import usual
@@ -33,7 +32,6 @@ from world import World
 
 SHARES = {"none": 0.4, "one": 0.45, "pair": 0.05, "outside": 0.1}
 LEAST_DETECTABLE = 0.15  # mean square, standard deviations
-SHOWS = 3.0  # as in `diagnose-learn`: below it, nothing has to be made up for
 PROBED, COMPARED = 3, 8  # episodes
 MOST_ROWS = 12000
 DRAWS = {"wide": wide, "usual": usual}
@@ -109,7 +107,7 @@ def try_log(rng, engine, variant, simulate=simulate, draws=wide):
         stamps = [sensors.draw_stamps(rng, rig, episode.seconds) for episode in plan]
         bare, full = World(scene, {}, engine, variant), World(scene, effects, engine, variant)
         if kind == "none":
-            return rng, scene, rig, kind, effects, plan, stamps, simulate(full, plan), 0.0, {}, None
+            return rng, scene, rig, kind, effects, plan, stamps, simulate(full, plan), 0.0, {}
         some = list(range(0, len(plan), max(1, len(plan) // PROBED)))[:PROBED]
         seen = probe(bare, full, plan, stamps, some, effects, rig)
         if seen >= LEAST_DETECTABLE:
@@ -118,14 +116,13 @@ def try_log(rng, engine, variant, simulate=simulate, draws=wide):
             without = [bare.run(plan[i]) for i in some]
             seen = compared([traces[i] for i in some], without, [stamps[i] for i in some], effects, rig)
             each = {}
-            rest = retune.left(traces, scene, rig, plan, stamps, effects, engine, variant) if seen >= SHOWS else None
             if kind == "pair":
                 for name in effects:
                     others = {n: p for n, p in effects.items() if n != name}
                     alone = World(scene, others, engine, variant)
-                    others_alone = [alone.run(plan[i]) for i in some]
-                    each[name] = compared([traces[i] for i in some], others_alone, [stamps[i] for i in some], effects, rig, others)
-            return rng, scene, rig, kind, effects, plan, stamps, traces, seen, each, rest
+                    rest = [alone.run(plan[i]) for i in some]
+                    each[name] = compared([traces[i] for i in some], rest, [stamps[i] for i in some], effects, rig, others)
+            return rng, scene, rig, kind, effects, plan, stamps, traces, seen, each
     raise Faint(f"no effect of kind {kind} shows in 12 draws")
 
 
@@ -183,7 +180,7 @@ holdout_fraction = 0.3
 """
 
 
-def truth_of(seed, index, engine, variant, scene, rig, kind, effects, plan, seen, each, rest, kept, rows):
+def truth_of(seed, index, engine, variant, scene, rig, kind, effects, plan, seen, each, kept, rows):
     catalogue = kind in ("one", "pair")
     friction = effects["friction_level"]["coefficient"] if "friction_level" in effects else scene.friction
     listed = [{"name": n, "parameters": p} | ({"in_range": hidden.in_range(n, p)} if catalogue else {})
@@ -192,7 +189,7 @@ def truth_of(seed, index, engine, variant, scene, rig, kind, effects, plan, seen
         "name": f"log-{index:03d}", "seed": seed, "engine": engine, "variant": variant, "engine_version": engines.version(engine),
         "natural": list(engines.NATURAL.get((engine, variant), ())), "kind": kind,
         "effects": listed if catalogue else [], "outside": listed if kind == "outside" else [],
-        "detectable": four_digits(seen), **({} if rest is None else rest), "designed": rig.designed and not rig.tosses, "tosses": rig.tosses,
+        "detectable": four_digits(seen), "designed": rig.designed and not rig.tosses, "tosses": rig.tosses,
         "sensors": sorted(rig.sensors), "period_s": rig.period_s, "straight": rig.straight,
         "jitter": round(rig.jitter, 4), "dropped": round(rig.dropped, 4),
         "lost_poses": round(rig.lost_poses, 4), "own_rows": rig.own_rows, "force_mean": rig.force_mean, "skew_s": rig.skew_s,
@@ -209,7 +206,7 @@ def make(options, index):
     began = time.perf_counter()
     variants = engines.ENGINES[options.engine]
     variant = variants[index % len(variants)] if options.variant == "all" else options.variant
-    rng, scene, rig, kind, effects, plan, stamps, traces, seen, each, rest = draw_log(options.seed, index, options.engine, variant, DRAWS[options.draws])
+    rng, scene, rig, kind, effects, plan, stamps, traces, seen, each = draw_log(options.seed, index, options.engine, variant, DRAWS[options.draws])
     of = "" if options.draws == "wide" else f"-{options.draws}"
     folder = options.out / f"{options.engine}-{options.variant}{of}-seed{options.seed}"
     name = f"log-{index:03d}"
@@ -229,11 +226,10 @@ def make(options, index):
     (folder / "truth").mkdir(exist_ok=True)
     (folder / name / "log.toml").write_text(header(scene, rig))
     (folder / name / "samples.csv").write_text("\n".join(out) + "\n")
-    truth = truth_of(options.seed, index, options.engine, variant, scene, rig, kind, effects, plan, seen, each, rest, kept, len(out) - 1)
+    truth = truth_of(options.seed, index, options.engine, variant, scene, rig, kind, effects, plan, seen, each, kept, len(out) - 1)
     (folder / "truth" / f"{name}.json").write_text(json.dumps(truth, indent=1, ensure_ascii=False) + "\n")
     what = "+".join(effects) or "none"
-    left = "" if rest is None else f", {rest['after_retuning']:.3g} after re-tuning"
-    print(f"{folder.name}/{name}: {what}, {variant}, {kept} episodes, {len(out) - 1} rows, detectable {seen:.3g}{left}, "
+    print(f"{folder.name}/{name}: {what}, {variant}, {kept} episodes, {len(out) - 1} rows, detectable {seen:.3g}, "
           f"{time.perf_counter() - began:.1f} s", flush=True)
 
 

@@ -17,7 +17,6 @@ GROUPS = {
 NOISE_OF = {"tool": "tool_position_m", "force": "wrist_force_n", "torque": "wrist_torque_nm", "position": "object_position_m",
             "orientation": "object_orientation_rad", "linear": "object_velocity_mps", "spin": "object_spin_rps"}
 OBJECT = ("position", "orientation", "linear", "spin")
-FARTHEST = 1e3  # standard deviations that a reading counts as off, at most
 
 
 def product(a, b):
@@ -178,7 +177,7 @@ def difference(one, two, rig):
         if key == "orientation":
             # Twice the vector part of the turn between the two.
             off = 2.0 * product(a[:n], b[:n] * [-1, -1, -1, 1])[:, :3]
-        total += float((np.clip(off / sigma, -FARTHEST, FARTHEST) ** 2).sum())
+        total += float((np.clip(off / sigma, -1e3, 1e3) ** 2).sum())
         count += off.size
     return total, count
 

@@ -117,7 +117,6 @@ fn truth(arguments: &Arguments, root: &Path, problem: &Problem, log: &Log) -> Re
         effects: hidden.iter().map(Named::new).collect(),
         outside: Vec::new(),
         detectable: Some(difference(log, &without)),
-        after_retuning: None,
         natural: Vec::new(),
         designed: arguments.actions == Actions::Designed,
         episodes: log.episodes.len(),
