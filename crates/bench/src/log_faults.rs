@@ -232,9 +232,10 @@ fn visible(fault: &Fault, log: &Log, good: &Check, spoilt: &Check) -> bool {
         Fault::Meant(Reading::AddedMassScaled(_), _) => true,
         Fault::Meant(..) => rises,
         // Motion has to tell when it was, by more than its noise; it follows the unevenness that the good log has.
-        Fault::Jitter => spoilt.followed.zip(good.clock.as_ref().zip(spoilt.clock.as_ref())).is_some_and(
-            |(followed, (own, all))| followed.tells((own.jitter_secs / all.jitter_secs).powi(2).min(1.0)),
-        ),
+        Fault::Jitter => spoilt
+            .followed
+            .zip(good.clock.as_ref().zip(spoilt.clock.as_ref()))
+            .is_some_and(|(followed, (own, all))| followed.tells((own.jitter_secs / all.jitter_secs).powi(2).min(1.0))),
         // The sensors' own rate has to be the header's, and to be known that well.
         Fault::Stretched => good.clock.as_ref().is_some_and(|clock| {
             clock.margin() < STRETCH && (clock.period_secs / log.header.period_secs - 1.0).abs() < STRETCH
@@ -302,7 +303,10 @@ fn spoil(fault: &Fault, log: &Log) -> Option<(Log, Kind)> {
             Kind::Jitter
         }
         Fault::Stretched => {
-            spoilt.episodes.iter_mut().for_each(|episode| episode.time_secs.iter_mut().for_each(|secs| *secs *= 1.0 + STRETCH));
+            spoilt
+                .episodes
+                .iter_mut()
+                .for_each(|episode| episode.time_secs.iter_mut().for_each(|secs| *secs *= 1.0 + STRETCH));
             Kind::Rate
         }
         Fault::Repeated => {

@@ -84,9 +84,13 @@ pub fn check(log: &Log, arm: Option<&Robot>) -> Check {
     }
     let meant = geometry.as_ref().and_then(|suspicion| suspicion.readings.first().copied());
     let mass_kg = log.header.object.mass_kg.mean();
-    suspicions.extend(sensors::suspicions(log, &sensors, clock.as_ref(), followed.as_ref(), &|index, secs, force_n| {
-        motions.is_blow(index, secs, force_n, mass_kg)
-    }));
+    suspicions.extend(sensors::suspicions(
+        log,
+        &sensors,
+        clock.as_ref(),
+        followed.as_ref(),
+        &|index, secs, force_n| motions.is_blow(index, secs, force_n, mass_kg),
+    ));
     suspicions.extend(geometry);
     let contacts = Contacts::new(meant.as_ref(), log, &tool, &motions);
     let forces = contacts.forces(None);

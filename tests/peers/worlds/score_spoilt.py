@@ -5,8 +5,8 @@
     for log in runs/spoilt/*; do cargo xtask diagnose --measured $log --out runs/answers/$(basename $log); done
     python tests/peers/worlds/score_spoilt.py runs/spoilt runs/answers
 
-The logs hide nothing, so that every effect that is named is wrong, but for those that are the fault itself (`SAME`). A log that is refused, with a
-sentence, is no answer.
+The logs hide nothing, so that every effect that is named is wrong, but for those that are the fault itself (`SAME`). A log without an answer, such as one that is
+refused, is counted apart.
 """
 
 import json
@@ -37,11 +37,11 @@ def main():
     rows = {}
     for log in sorted(path for path in logs.iterdir() if path.is_dir()):
         fault = fault_of(log)
-        row = rows.setdefault(fault, {"logs": 0, "refused": 0, "warned": 0, "effect": 0, "sure": 0, "silent": []})
+        row = rows.setdefault(fault, {"logs": 0, "no_answer": 0, "warned": 0, "effect": 0, "sure": 0, "silent": []})
         row["logs"] += 1
         report = answers / log.name / "report.json"
         if not report.exists():
-            row["refused"] += 1
+            row["no_answer"] += 1
             continue
         answer = json.loads(report.read_text())
         best = max(answer["probabilities"]["effects"], key=lambda effect: effect[1], default=None)
@@ -52,10 +52,10 @@ def main():
         row["sure"] += sure
         if sure and not answer["warnings"]:
             row["silent"].append(f"{log.name}: {best[0]} {best[1]:.2f}")
-    print("| fault | logs | refused | warned of | another effect named | of these 0.9 sure | of these without a warning |")
+    print("| fault | logs | no answer | warned of | another effect named | of these 0.9 sure | of these without a warning |")
     print("|---|---|---|---|---|---|---|")
     for fault, row in rows.items():
-        print(f"| {fault} | {row['logs']} | {row['refused']} | {row['warned']} | {row['effect']} | {row['sure']} | {len(row['silent'])} |")
+        print(f"| {fault} | {row['logs']} | {row['no_answer']} | {row['warned']} | {row['effect']} | {row['sure']} | {len(row['silent'])} |")
     for fault, row in rows.items():
         for line in row["silent"]:
             print(f"\n{fault}, {line}")
