@@ -118,6 +118,17 @@ mod tests {
     }
 
     #[test]
+    fn what_it_could_tell_is_what_it_would_find_in_nineteen_of_twenty() {
+        // Where none is followed the error may be 0.5 / 5.645 at most; where more than half is, none is small enough.
+        for (share, error, tells) in
+            [(0.0, 0.088, true), (0.0, 0.089, false), (0.3, 0.035, true), (0.3, 0.036, false), (0.6, 1e-9, false)]
+        {
+            assert_eq!(Followed { share: 1.0, error }.tells(share), tells, "{share} {error}");
+        }
+        assert!(followed(true, 2e-4).tells(0.0) && !followed(true, 0.02).tells(0.0));
+    }
+
+    #[test]
     fn noise_that_hides_the_motion_is_no_suspicion() {
         let hidden = followed(false, 0.02);
         assert!(hidden.error > 0.2 && !hidden.is_of_arrival(), "{hidden:?}");

@@ -11,8 +11,9 @@ use crate::suspicion::{Kind, Suspicion};
 pub(crate) const DEAD_ROWS: usize = 50;
 /// A spike is this many times larger than what its neighbours, and nine in ten of all readings, differ from each other by.
 const SPIKE: f64 = 8.0;
-/// Rows, and seconds, in which a reading can be away and come back; what moves takes longer.
+/// Rows in which a reading can be away and come back.
 const MOST_AWAY: usize = 5;
+/// Longest time, s, that it is away where a hand or gravity could bring it back. Nothing brings an object back along the table and lets it rest at once.
 const AWAY_SECS: f64 = 0.1;
 /// A force is beyond what contacts do if it is so many times larger than all others but a few.
 const BEYOND: f64 = 10.0;
@@ -317,7 +318,8 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
             {
                 let value = |i: usize| rows[i].1;
                 let secs = episode.time_secs[rows[3].0];
-                if burst > 1 && episode.time_secs[rows[2 + burst].0] - secs > AWAY_SECS {
+                let along = matches!(channel, Channel::ObjectPosition(Axis::X | Axis::Y));
+                if burst > 1 && !along && episode.time_secs[rows[2 + burst].0] - secs > AWAY_SECS {
                     continue;
                 }
                 let (before, after) = (value(2), value(3 + burst));

@@ -2,11 +2,11 @@
 """What `diagnose` says of good logs that were spoilt: whether it is surely wrong without a warning.
 
     cargo xtask bench log-check LOG LOG … --write runs/spoilt
-    for log in runs/spoilt/*; do cargo xtask diagnose --measured $log --out runs/answers/$(basename $log); done
-    python tests/peers/worlds/score_spoilt.py runs/spoilt runs/answers
+    for log in runs/spoilt/* LOG LOG …; do cargo xtask diagnose --measured $log --out runs/answers/$(basename $log); done
+    python tests/peers/worlds/score_spoilt.py runs/spoilt runs/answers LOG LOG …
 
 The logs hide nothing, so that every effect that is named is wrong, but for those that are the fault itself (`SAME`). A log without an answer, such as one that is
-refused, is counted apart.
+refused, is counted apart. The logs as they were, where they are named, are a row of their own.
 """
 
 import json
@@ -29,13 +29,13 @@ SURE = 0.9
 def fault_of(log):
     """As `log.toml` says in its first line."""
     found = re.search(r"Spoilt: (.+)", (log / "log.toml").read_text())
-    return found.group(1).strip() if found else "?"
+    return found.group(1).strip() if found else "as they were"
 
 
 def main():
     logs, answers = map(pathlib.Path, sys.argv[1:3])
     rows = {}
-    for log in sorted(path for path in logs.iterdir() if path.is_dir()):
+    for log in [*map(pathlib.Path, sys.argv[3:]), *sorted(path for path in logs.iterdir() if path.is_dir())]:
         fault = fault_of(log)
         row = rows.setdefault(fault, {"logs": 0, "no_answer": 0, "warned": 0, "effect": 0, "sure": 0, "silent": []})
         row["logs"] += 1
