@@ -13,7 +13,9 @@
 mod interval;
 mod quantile;
 mod sign_flip;
+mod uniform;
 
 pub use interval::wilson95;
 pub use quantile::{nearest_rank, quantile, weighted_quantile};
 pub use sign_flip::sign_flip;
+pub use uniform::uniform_p;

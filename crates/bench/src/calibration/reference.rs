@@ -50,11 +50,18 @@ impl Ruler {
         [of(|chain| chain.log_mass), of(|chain| chain.friction)]
     }
 
+    /// By what the two runs differ: R̂ of ln mass and of friction, and the difference of their probabilities of an obstacle.
+    pub(super) fn differences(&self) -> [f64; 3] {
+        let [mass, friction] = self.scale_reductions();
+        let [a, b] = self.chains.each_ref().map(|chain| chain.obstacle);
+        [mass, friction, (a - b).abs()]
+    }
+
     /// Whether the two runs agree.
     #[must_use]
     pub fn agrees(&self) -> bool {
-        let [a, b] = self.chains.each_ref().map(|chain| chain.obstacle);
-        self.scale_reductions().iter().all(|scale| *scale <= MOST_SCALE) && (a - b).abs() <= MOST_DIFFERENCE
+        let [mass, friction, obstacle] = self.differences();
+        mass <= MOST_SCALE && friction <= MOST_SCALE && obstacle <= MOST_DIFFERENCE
     }
 }
 

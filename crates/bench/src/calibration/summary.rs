@@ -83,6 +83,8 @@ pub(super) fn summary(worlds: &[World], provenance: &Value) -> Value {
             "all": beside(&ruled, &mut rng),
             "chains_agree": beside(&agreed, &mut rng),
             "failed": worlds.iter().filter(|w| w.ruler_failure.is_some()).count(),
+            "ranks": rank_table(&ruled),
+            "agreement": ruled.iter().map(|(_, ruler)| ruler.differences()).collect::<Vec<_>>(),
             "transitions_per_chain": per_update(
                 &ruled.iter().flat_map(|(_, r)| r.chains.iter().map(|c| c.transitions as f64)).collect::<Vec<_>>()
             ),
@@ -108,6 +110,18 @@ fn beside(ruled: &[(&World, &Ruler)], rng: &mut Rng) -> Value {
         sources.insert(name.into(), Value::Object(figures));
     }
     json!({ "worlds": ruled.len(), "sources": sources })
+}
+
+/// Histograms of the ranks of the truth, and of the joint test, each with the probability that uniform ones are as uneven or more.
+fn rank_table(ruled: &[(&World, &Ruler)]) -> Value {
+    let rows = || ruled.iter().map(|(_, ruler)| &ruler.row);
+    let told = |counts: [usize; 10]| json!({ "counts": counts, "p": statistics::uniform_p(&counts) });
+    let of_number = NUMBERS
+        .iter()
+        .enumerate()
+        .map(|(index, (name, _))| ((*name).to_owned(), told(histogram(rows().filter_map(|row| row.ranks[index])))));
+    let joint = ("joint".to_owned(), told(histogram(rows().map(|row| row.tarp))));
+    Value::Object(of_number.chain([joint]).collect())
 }
 
 fn at(rows: &[Row], step: usize) -> Option<&Row> {

@@ -97,6 +97,29 @@ fn reference(reference: &Value, text: &mut String) {
             *text += &format!("| {title} | {source} | {} |\n", values.join(" | "));
         }
     }
+    ranks(reference, text);
+}
+
+/// How even the ranks of the truth among the samples are, and how far the chains are from agreement.
+fn ranks(reference: &Value, text: &mut String) {
+    let (Some(ranks), Some(agreement)) = (reference["ranks"].as_object(), reference["agreement"].as_array()) else {
+        return;
+    };
+    *text += "\nRanks of the truth among the samples, in tenths, with the probability that uniform ones are as uneven (χ²), all worlds:\n\n\
+              | number | counts | p |\n|---|---|---|\n";
+    for (name, rank) in ranks {
+        *text += &format!("| {} | {} | {} |\n", name.replace('_', " "), rank["counts"], number(&rank["p"], 3));
+    }
+    let within = |index: usize, most: f64| {
+        agreement.iter().filter(|world| world[index].as_f64().is_some_and(|found| found <= most)).count()
+    };
+    *text += &format!(
+        "\nOf {} worlds R̂ of ln mass is at most {MOST_SCALE} in {}, of friction in {}, and P(obstacle) differs by at most {MOST_DIFFERENCE} in {}.\n",
+        agreement.len(),
+        within(0, MOST_SCALE),
+        within(1, MOST_SCALE),
+        within(2, MOST_DIFFERENCE)
+    );
 }
 
 fn rows(summary: &Value, text: &mut String, cells: impl Fn(&Value) -> Vec<String>) {
