@@ -45,6 +45,8 @@ pub(crate) struct Motions {
     pub(crate) position_m: f64,
     /// Whether turns of the object were read.
     pub(crate) turns: bool,
+    /// By places alone, where turns were read in few rows: once an episode, by a person, for example.
+    placed: Option<Vec<Motion>>,
 }
 
 /// Hard bodies of some hundred grams touch about so long (Hertz), and no engine's step is much shorter.
@@ -57,24 +59,35 @@ const BLOW_MARGIN: f64 = 5.0;
 impl Motions {
     /// Of a log whose object is `size_m` wide. `tool` gives the tool centre of a row.
     pub(crate) fn new(log: &Log, size_m: f64, tool: impl Fn(&Episode, usize) -> Option<[f64; 3]>) -> Self {
-        let turns = has_turns(log);
-        let all: Vec<(u64, Vec<Seen>)> =
-            log.episodes.iter().map(|episode| (episode.id, seen(episode, turns, &tool))).collect();
-        let steps = |size: fn(&Seen, &Seen) -> f64| {
+        let turned = count(log, Channel::ObjectOrientation(measured_log::Component::W));
+        let placed = count(log, Channel::ObjectPosition(Axis::X));
+        // Of a ball, whose turns say nothing of where it is, in most rows.
+        let ball = matches!(log.header.object.shape, Shape::Sphere { .. });
+        let turns = turned > 0 && (!ball || 2 * turned > placed);
+        let paths = |turns: bool| -> Vec<(u64, Vec<Seen>)> {
+            log.episodes.iter().map(|episode| (episode.id, seen(episode, turns, &tool))).collect()
+        };
+        let all = paths(turns);
+        let steps = |all: &[(u64, Vec<Seen>)], size: fn(&Seen, &Seen) -> f64| {
             let steps = all.iter().flat_map(|(_, seen)| seen.windows(2).map(move |two| size(&two[0], &two[1])));
             scatter(steps.collect())
         };
-        let position_m = steps(|a, b| (b.pose.translation.vector - a.pose.translation.vector).norm());
-        let turn_rad = steps(|a, b| a.pose.rotation.angle_to(&b.pose.rotation));
-        let far = [(SIGMAS * position_m).max(LEAST_SHARE * size_m), (SIGMAS * turn_rad).max(LEAST_RAD)];
-        let episodes = all
-            .into_iter()
-            .map(|(id, seen)| {
+        let way = |a: &Seen, b: &Seen| (b.pose.translation.vector - a.pose.translation.vector).norm();
+        let motions = |all: Vec<(u64, Vec<Seen>)>, position_m: f64| -> Vec<Motion> {
+            let turn_rad = steps(&all, |a, b| a.pose.rotation.angle_to(&b.pose.rotation));
+            let far = [(SIGMAS * position_m).max(LEAST_SHARE * size_m), (SIGMAS * turn_rad).max(LEAST_RAD)];
+            let one = |(id, seen): (u64, Vec<Seen>)| {
                 let (onsets, rests) = onsets(&seen, far);
                 Motion { id, seen, onsets, rests }
-            })
-            .collect();
-        Self { episodes, position_m, turns }
+            };
+            all.into_iter().map(one).collect()
+        };
+        let few = turns && 2 * turned < placed;
+        let placed = few.then(|| paths(false));
+        let position_m = steps(placed.as_ref().unwrap_or(&all), way);
+        let placed = placed.map(|all| motions(all, position_m));
+        let episodes = motions(all, position_m);
+        Self { episodes, position_m, turns, placed }
     }
 
     /// Whether a force for a moment, N, can be a blow on an object of this mass in an episode, by its index, at a time, s.
@@ -82,7 +95,7 @@ impl Motions {
     /// A blow lasts [`BLOW_SECS`] or longer, and its impulse is the mass times what the object's velocity changes by: where it sets out from rest at most twice its
     /// largest speed about then, else what is seen before and after, if that is more than noise.
     pub(crate) fn is_blow(&self, index: usize, secs: f64, force_n: f64, mass_kg: f64) -> bool {
-        let motion = &self.episodes[index];
+        let motion = &self.placed.as_ref().unwrap_or(&self.episodes)[index];
         let way = |a: &Seen, b: &Seen| b.pose.translation.vector - a.pose.translation.vector;
         let possible = |change_mps: f64| force_n * BLOW_SECS <= BLOW_MARGIN * mass_kg * change_mps;
         let about = |seen: &Seen| (seen.secs - secs).abs() < BLOW_SIDE_SECS;
@@ -115,18 +128,9 @@ impl Motions {
     }
 }
 
-/// Whether turns of the object were read: of a ball, whose turns say nothing of where it is, in most rows.
-fn has_turns(log: &Log) -> bool {
-    let count = |channel: Channel| -> usize {
-        log.episodes
-            .iter()
-            .filter_map(|episode| episode.channels.get(&channel))
-            .map(measured_log::Readings::count)
-            .sum()
-    };
-    let turned = count(Channel::ObjectOrientation(measured_log::Component::W));
-    let ball = matches!(log.header.object.shape, Shape::Sphere { .. });
-    if ball { 2 * turned > count(Channel::ObjectPosition(Axis::X)) } else { turned > 0 }
+/// How often a channel was read.
+fn count(log: &Log, channel: Channel) -> usize {
+    log.episodes.iter().filter_map(|episode| episode.channels.get(&channel)).map(measured_log::Readings::count).sum()
 }
 
 /// Standard deviation of a component of readings of which these are the steps' lengths: the lower quartile, which motion leaves alone.
@@ -200,4 +204,41 @@ fn onsets(seen: &[Seen], far: [f64; 2]) -> (Vec<usize>, Vec<usize>) {
 /// The three components of a channel in a row.
 pub(crate) fn vector(episode: &Episode, make: fn(Axis) -> Channel, row: usize) -> Option<Vector3<f64>> {
     episode.vector(make, row).map(Vector3::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use measured_log::Component;
+
+    use super::*;
+
+    /// Rows of all episodes, and in how many of them a force may be a blow.
+    fn blows(log: &Log) -> Vec<bool> {
+        let tool = |episode: &Episode, row: usize| episode.vector(Channel::Tool, row);
+        let motions = Motions::new(log, 0.08, tool);
+        let rows = log.episodes.iter().enumerate();
+        rows.flat_map(|(index, episode)| episode.time_secs.iter().map(move |secs| (index, *secs)))
+            .map(|(index, secs)| motions.is_blow(index, secs, 100.0, 0.5))
+            .collect()
+    }
+
+    #[test]
+    fn blows_are_known_where_a_turn_was_read_once_an_episode() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs/set-000");
+        let log = measured_log::read(&folder).unwrap();
+        let all = blows(&log);
+        let mut few = log;
+        for episode in &mut few.episodes {
+            for component in Component::ALL {
+                let cells = episode.channels.get_mut(&Channel::ObjectOrientation(component)).unwrap();
+                *cells = (0..cells.len()).map(|row| cells.get(row).filter(|_| row == 0)).collect();
+            }
+        }
+        let few = blows(&few);
+        let (possible, same) =
+            (all.iter().filter(|blow| **blow).count(), all.iter().zip(&few).filter(|(a, b)| a == b).count());
+        assert!(possible > 20 && 10 * same > 9 * all.len(), "{possible}, {same} of {}", all.len());
+    }
 }
