@@ -127,6 +127,10 @@ pub(crate) fn value(value: &Value) -> String {
     let digits = digits(value);
     let [low, high] = value.interval90;
     let unit = if value.unit == "1" { String::new() } else { format!(" {}", value.unit) };
+    // What a fit that allows no negative value left out has no interval.
+    if [value.value, low, high] == [0.0; 3] {
+        return format!("{} = 0{unit} (left out)", value.name);
+    }
     format!("{} = {:.digits$}{unit} (90 %: {low:.digits$} to {high:.digits$})", value.name, value.value)
 }
 
@@ -158,4 +162,17 @@ fn next_experiment(diagnosis: &Diagnosis) -> String {
         "a log of another motion, to prove the model on it"
     };
     sentence.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_have_the_decimals_of_their_intervals_and_what_is_left_out_has_none() {
+        let of = |name, at, interval90| value(&Value { name, unit: "N m", value: at, interval90, least: 0.0 });
+        assert_eq!(of("coulomb", 0.5049, [0.4412, 0.5671]), "coulomb = 0.50 N m (90 %: 0.44 to 0.57)");
+        assert_eq!(of("coulomb", 0.0, [0.0, 0.031]), "coulomb = 0.000 N m (90 %: 0.000 to 0.031)");
+        assert_eq!(of("coulomb", 0.0, [0.0, 0.0]), "coulomb = 0 N m (left out)");
+    }
 }

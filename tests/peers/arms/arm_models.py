@@ -134,10 +134,16 @@ def _physical(inertia: np.ndarray) -> np.ndarray:
     return inertia_of(vectors @ np.diag(values) @ vectors.T)
 
 
+def file_of(name: str) -> str:
+    """The URDF file of an arm of the catalogue, as its package has it."""
+    package, path = CATALOGUE[name][:2]
+    return os.path.join(_package_folder(package), path)
+
+
 def load_arm(name: str) -> Arm:
     """Read an arm of the catalogue."""
-    package, path, base, tip, payload_scale, velocities = CATALOGUE[name]
-    root = ET.parse(os.path.join(_package_folder(package), path)).getroot()
+    _, _, base, tip, payload_scale, velocities = CATALOGUE[name]
+    root = ET.parse(file_of(name)).getroot()
     all_joints = {j.find("child").get("link"): j for j in root.findall("joint")}
     # the moving joints: those between base and tip
     on_path, link = set(), tip

@@ -3,6 +3,8 @@
     python published_logs.py tx40 CLONE --out DIR       github.com/thanhndv212/figaroh-examples, Staubli TX40, 9 s at 5 kHz
     python published_logs.py tiago CLONE --out DIR      the same repository, TIAGo's arm, 59 s at 100 Hz
     python published_logs.py airbot CLONE --out DIR     github.com/liuyurong129/figaroh_kinova, AIRBOT Play, 30 s at 100 Hz
+    python published_logs.py panda CLONE --out DIR      github.com/marcocognetti/FrankaEmikaPandaDynModel, Panda, 20 s at 250 Hz, with the file of
+                                                        example-robot-data (pip install example-robot-data), and of pybullet_data
 
 Constants are those of the repositories' own scripts and settings: gear ratios, the coupled wrist of the TX40, motor constants.
 """
@@ -78,13 +80,29 @@ def airbot(clone: str, out: str) -> None:
               None, 0.01, np.arange(rows) * 0.01, position[:rows], torque[:rows])
 
 
+def panda(clone: str, out: str) -> None:
+    """Every fourth row of what the authors logged at 1 kHz, with their uneven stamps."""
+    import arm_models
+    import pybullet_data
+
+    folder = os.path.join(clone, "matlab/data/Exciting_Traj/Trajectory_1/rbt_log")
+    time_secs, position, velocity, torque = (np.loadtxt(f"{folder}/exciting_traj_{name}.txt")
+                                             for name in ("time", "positions", "velocity", "torques"))
+    position, velocity, torque = (values.reshape(-1, 7)[::4] for values in (position, velocity, torque))
+    files = {"example-robot-data": arm_models.file_of("panda"),
+             "pybullet_data": os.path.join(pybullet_data.getDataPath(), "franka_panda/panda.urdf")}
+    for name, urdf in files.items():
+        write(os.path.join(out, name), urdf, [f"panda_joint{i}" for i in range(1, 8)], None, 0.004, time_secs[::4], position,
+              torque, velocity)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("arm", choices=["tx40", "tiago", "airbot"])
+    parser.add_argument("arm", choices=["tx40", "tiago", "airbot", "panda"])
     parser.add_argument("clone", help="folder of the cloned repository")
     parser.add_argument("--out", required=True)
     options = parser.parse_args()
-    {"tx40": tx40, "tiago": tiago, "airbot": airbot}[options.arm](options.clone, options.out)
+    {"tx40": tx40, "tiago": tiago, "airbot": airbot, "panda": panda}[options.arm](options.clone, options.out)
 
 
 if __name__ == "__main__":
