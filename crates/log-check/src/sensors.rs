@@ -13,8 +13,11 @@ pub(crate) const DEAD_ROWS: usize = 50;
 const SPIKE: f64 = 8.0;
 /// Rows in which a reading can be away and come back.
 const MOST_AWAY: usize = 5;
-/// Longest time, s, that it is away where a hand or gravity could bring it back. Nothing brings an object back along the table and lets it rest at once.
+/// Longest time, s, that it is away, whatever it does there.
 const AWAY_SECS: f64 = 0.1;
+/// Longest time, s, that an object is away along the table where it jumps, rests there, jumps back and rests. What tips, or hangs on a spring, comes back too, but not
+/// without a way there and back; and a hand is slower.
+const AWAY_RESTING_SECS: f64 = 0.5;
 /// A force is beyond what contacts do if it is so many times larger than all others but a few.
 const BEYOND: f64 = 10.0;
 const FEW: usize = 10;
@@ -288,6 +291,18 @@ pub fn without_dead(log: &Log) -> Option<Log> {
     })
 }
 
+/// The noise that the header states of a column.
+fn stated(log: &Log, channel: Channel) -> Option<f64> {
+    let noise = &log.header.noise;
+    match channel {
+        Channel::WristForce(_) => noise.wrist_force_n,
+        Channel::Tool(_) => noise.tool_position_m,
+        Channel::Joint(_) => noise.joint_position_rad,
+        Channel::ObjectPosition(_) => noise.object_position_m,
+        _ => None,
+    }
+}
+
 /// Single readings, and of places up to [`MOST_AWAY`] in a row, that stand out from those before and after by far more than these from each other.
 ///
 /// Of places, which cannot go there and back; of forces only far beyond all others, and not where they may be a blow, which is as short. `blow`: whether one is
@@ -303,12 +318,17 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
     // But for a few.
     let beyond = BEYOND * sizes.get(FEW).copied()?;
     // Nine in ten of all neighbours differ by less.
-    let steps = |episode: &Episode, channel: Channel| -> Vec<f64> {
+    let of_channel = |episode: &Episode, channel: Channel| -> Vec<f64> {
         let read: Vec<f64> = readings(episode, channel).map(|(_, value)| value).collect();
         read.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect()
     };
-    let all = log.episodes.iter().flat_map(|episode| group.iter().flat_map(move |channel| steps(episode, *channel)));
-    let usual = statistics::nearest_rank(all, 0.9)?;
+    let all =
+        log.episodes.iter().flat_map(|episode| group.iter().flat_map(move |channel| of_channel(episode, *channel)));
+    let steps: Vec<f64> = all.collect();
+    let usual = statistics::nearest_rank(steps.iter().copied(), 0.9)?.max(stated(log, group[0]).unwrap_or(0.0));
+    // Of what hardly moves and is rounded, the last digit.
+    let digit = || steps.iter().copied().filter(|step| *step > 0.0).reduce(f64::min);
+    let usual = if usual > 0.0 { usual } else { digit()? };
     let mut far: Vec<(f64, u64, f64, Channel, f64, usize)> = Vec::new();
     for (index, episode) in log.episodes.iter().enumerate() {
         for channel in group {
@@ -318,8 +338,10 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
             {
                 let value = |i: usize| rows[i].1;
                 let secs = episode.time_secs[rows[3].0];
+                let long = burst > 1 && episode.time_secs[rows[2 + burst].0] - secs > AWAY_SECS;
+                let gone_secs = episode.time_secs[rows[3 + burst].0] - episode.time_secs[rows[2].0];
                 let along = matches!(channel, Channel::ObjectPosition(Axis::X | Axis::Y));
-                if burst > 1 && !along && episode.time_secs[rows[2 + burst].0] - secs > AWAY_SECS {
+                if long && (!along || gone_secs > AWAY_RESTING_SECS) {
                     continue;
                 }
                 let (before, after) = (value(2), value(3 + burst));
@@ -332,6 +354,10 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
                     [(0, 1), (1, 2), (3, 4), (4, 5)].map(|(a, b)| if a < 2 { (a, b) } else { (a + burst, b + burst) });
                 let near = near.map(|(a, b)| (value(b) - value(a)).abs());
                 let limit = SPIKE * near.into_iter().fold(usual, f64::max);
+                let rests = (3..2 + burst).all(|i| SPIKE * (value(i + 1) - value(i)).abs() < alone);
+                if long && !rests {
+                    continue;
+                }
                 if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs, value(3).abs()))) {
                     far.push((alone / usual, episode.id, secs, *channel, value(3), burst));
                 }

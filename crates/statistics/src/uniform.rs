@@ -2,12 +2,15 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
-/// Probability that counts of equally likely bins differ from each other as much or more, by χ² (Pearson 1900); `None` for fewer than two bins or no counts.
-/// It is an approximation from about five counts a bin on.
+/// Counts a bin.
+const LEAST: usize = 5;
+
+/// Probability that counts of equally likely bins differ from each other as much or more, by χ² (Pearson 1900); `None` for fewer than two bins, and for
+/// fewer than five counts a bin, where χ² is no approximation.
 #[must_use]
 pub fn uniform_p(counts: &[usize]) -> Option<f64> {
     let total: usize = counts.iter().sum();
-    let degrees = counts.len().checked_sub(1).filter(|degrees| *degrees > 0 && total > 0)?;
+    let degrees = counts.len().checked_sub(1).filter(|degrees| *degrees > 0 && total >= LEAST * counts.len())?;
     let expected = total as f64 / counts.len() as f64;
     let chi2: f64 = counts.iter().map(|count| (*count as f64 - expected).powi(2) / expected).sum();
     Some(ChiSquared::new(degrees as f64).ok()?.sf(chi2))
@@ -32,6 +35,6 @@ mod tests {
         }
         let even = uniform_p(&[7; 10]).unwrap();
         assert!((even - 1.0).abs() < 1e-12, "{even}");
-        assert_eq!((uniform_p(&[]), uniform_p(&[3]), uniform_p(&[0, 0])), (None, None, None));
+        assert_eq!((uniform_p(&[]), uniform_p(&[30]), uniform_p(&[4, 5])), (None, None, None));
     }
 }
