@@ -168,7 +168,7 @@ pub fn diagnose_with(log: &Log, settings: &Settings, decision: &Decision) -> Opt
         Search::new(prepared, Catalogue::new(prepared), design)?.run()
     };
     let first = search(&prepared)?;
-    prepared.linearise(&first.masses(&prepared), first.gains(prepared.joints()), first.delay_secs());
+    prepared.linearise(&first.masses(&prepared), first.gains(&prepared), first.delay_secs());
     let found = search(&prepared)?;
     let left = leftover(&prepared, &found);
     let mut groups: Vec<(f64, Group)> =

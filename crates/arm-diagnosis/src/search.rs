@@ -9,8 +9,10 @@ use crate::features::{Candidate, Catalogue};
 use crate::fit::Fit;
 use crate::group::{FINER, coefficient, is_friction};
 use crate::masses::{MassFactors, best_factors, stddevs};
-use crate::prepared::Prepared;
+use crate::prepared::{Prepared, rms};
 
+/// Share of a joint's mean squared torque that its rigid arm has, at which half of a factor is believed.
+const LEAST_RIGID: f64 = 0.05;
 /// Hypotheses of a model, at most.
 const MOST_TERMS: usize = 16;
 /// Gain of evidence that a finer kind of friction must have over a simpler one: twenty to one, and [`FINER`] of what the simpler one leaves.
@@ -296,10 +298,14 @@ fn everything(catalogue: &Catalogue) -> Vec<usize> {
 }
 
 impl Found {
-    /// Factors of torque as they were fitted.
-    pub(crate) fn gains(&self, joints: usize) -> Vec<f64> {
-        let gain = |joint| 1.0 + self.value(&["torque_gain", "servo_gain"], Some(joint));
-        (0..joints).map(|joint| gain(joint).clamp(0.2, 5.0)).collect()
+    /// Factors of torque as they were fitted, as far as a joint's torque tells them: in one that is nearly all friction, what is wrong with its small share
+    /// passes for a factor, and friction would be divided by it.
+    pub(crate) fn gains(&self, prepared: &Prepared) -> Vec<f64> {
+        let gain = |joint: usize| {
+            let told = told(rms(&prepared.rigid[joint]), rms(&prepared.measured[joint]));
+            1.0 + told * self.value(&["torque_gain", "servo_gain"], Some(joint))
+        };
+        (0..prepared.joints()).map(|joint| gain(joint).clamp(0.2, 5.0)).collect()
     }
 
     /// Delay of torques as it was fitted, s.
@@ -316,6 +322,13 @@ impl Found {
     }
 }
 
+/// Share of a factor of torque that is believed, by the root mean squares of what the rigid arm needs in a joint and of what is measured there, N·m.
+fn told(rigid_nm: f64, measured_nm: f64) -> f64 {
+    let [rigid, least] = [rigid_nm.powi(2), LEAST_RIGID * measured_nm.powi(2)];
+    let told = rigid.powi(2) / (rigid.powi(2) + least.powi(2));
+    if told.is_finite() { told } else { 0.0 }
+}
+
 /// What a fit leaves of the gap, joint after joint, N·m.
 pub(crate) fn left(gap: &[f64], catalogue: &Catalogue, fit: &Fit, prepared: &Prepared) -> Vec<f64> {
     let windows = prepared.windows.len();
@@ -328,4 +341,16 @@ pub(crate) fn left(gap: &[f64], catalogue: &Catalogue, fit: &Fit, prepared: &Pre
         }
     }
     left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::told;
+
+    #[test]
+    fn a_factor_of_torque_is_believed_where_the_arm_itself_needs_torque() {
+        // All of it, a tenth of the mean square, a wrist that is nearly all friction, and a joint that nothing moves.
+        assert!(told(12.0, 12.0) > 0.99 && told(1.0, 10.0_f64.sqrt()) > 0.75);
+        assert!(told(0.02, 0.6) < 0.001 && told(0.0, 0.0) == 0.0 && told(0.0, 1.0) == 0.0);
+    }
 }

@@ -448,6 +448,26 @@ mod tests {
     }
 
     #[test]
+    fn what_was_hidden_or_is_read_seldom_may_have_gone_there_and_back() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs/set-001");
+        let log = thin(&measured_log::read(&folder).unwrap());
+        let accused = |log: &Log| check(log, None).suspicions.iter().any(|found| found.kind == Kind::Outliers);
+        let away = moved(&log, &[0.2, 0.2]);
+        let differs = |a: &measured_log::Episode, b: &measured_log::Episode| a.channels != b.channels;
+        let index = (0..log.episodes.len()).find(|i| differs(&away.episodes[*i], &log.episodes[*i])).unwrap();
+        let x = measured_log::Channel::ObjectPosition(measured_log::Axis::X);
+        let cells = |log: &Log, row: usize| log.episodes[index].channels[&x].get(row);
+        let row = (0..log.episodes[index].rows()).find(|row| cells(&away, *row) != cells(&log, *row)).unwrap();
+        // Hidden for two seconds before, or all times ten times as long.
+        let mut hidden = away.clone();
+        hidden.episodes[index].time_secs.iter_mut().skip(row).for_each(|secs| *secs += 2.0);
+        let mut slow = away.clone();
+        slow.header.period_secs *= 10.0;
+        slow.episodes.iter_mut().flat_map(|episode| &mut episode.time_secs).for_each(|secs| *secs *= 10.0);
+        assert!(accused(&away) && !accused(&hidden) && !accused(&slow));
+    }
+
+    #[test]
     fn what_can_be_seen_is_caught_and_good_logs_are_not_accused() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/mujoco-logs/logs");
         let logs: Vec<PathBuf> = (0..12).map(|i| folder.join(format!("set-{i:03}"))).collect();

@@ -106,13 +106,19 @@ impl Motions {
             // It may be thrown back as fast as it came.
             return speeds.reduce(f64::max).is_none_or(|fastest| possible(2.0 * fastest));
         }
-        let velocity = |from_secs: f64| -> Option<Vector3<f64>> {
-            let inside = |seen: &&Seen| (from_secs..=from_secs + BLOW_SIDE_SECS).contains(&seen.secs);
-            let mut seen = motion.seen.iter().filter(inside);
-            let (first, last) = (seen.next()?, seen.next_back()?);
+        // Of what a slow or hidden camera saw longer ago, the two readings that are nearest.
+        let velocity = |seen: &[Seen]| -> Option<Vector3<f64>> {
+            let (first, last) = (seen.first()?, seen.last()?);
             (last.secs > first.secs).then(|| way(first, last) / (last.secs - first.secs))
         };
-        let (Some(before), Some(after)) = (velocity(secs - BLOW_SIDE_SECS), velocity(secs)) else { return false };
+        let seen = &motion.seen;
+        let now = seen.partition_point(|seen| seen.secs < secs);
+        let from = seen.partition_point(|seen| seen.secs < secs - BLOW_SIDE_SECS).min(now.saturating_sub(2));
+        let to = seen.partition_point(|seen| seen.secs <= secs + BLOW_SIDE_SECS).max((now + 2).min(seen.len()));
+        // Nothing is known of an object that was not seen.
+        let (Some(before), Some(after)) = (velocity(&seen[from..now]), velocity(&seen[now..to])) else {
+            return !seen.is_empty();
+        };
         let change_mps = (after - before).norm();
         change_mps > SIGMAS * 2.0 * self.position_m / BLOW_SIDE_SECS && possible(change_mps)
     }

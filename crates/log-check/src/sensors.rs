@@ -15,9 +15,13 @@ const SPIKE: f64 = 8.0;
 const MOST_AWAY: usize = 5;
 /// Longest time, s, that it is away, whatever it does there.
 const AWAY_SECS: f64 = 0.1;
-/// Longest time, s, that an object is away along the table where it jumps, rests there, jumps back and rests. What tips, or hangs on a spring, comes back too, but not
-/// without a way there and back; and a hand is slower.
+/// Longest time, s, from the reading before to the one after where it jumps away, rests there, jumps back and rests. What tips, or hangs on a spring, comes back too,
+/// but not without a way there and back; and a hand is slower.
 const AWAY_RESTING_SECS: f64 = 0.5;
+/// Neighbours are so far apart at most, s: what was hidden from the sensor for longer may have gone there and back.
+const HIDDEN_SECS: f64 = 0.25;
+/// How much higher than a free flight between two readings an object is seen at most.
+const HOP_MARGIN: f64 = 1.5;
 /// A force is beyond what contacts do if it is so many times larger than all others but a few.
 const BEYOND: f64 = 10.0;
 const FEW: usize = 10;
@@ -303,6 +307,22 @@ fn stated(log: &Log, channel: Channel) -> Option<f64> {
     }
 }
 
+/// What neighbours usually differ by.
+fn usual_step(log: &Log, group: &[Channel]) -> Option<f64> {
+    // Nine in ten of all neighbours differ by less.
+    let of_channel = |episode: &Episode, channel: Channel| -> Vec<f64> {
+        let read: Vec<f64> = readings(episode, channel).map(|(_, value)| value).collect();
+        read.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect()
+    };
+    let all =
+        log.episodes.iter().flat_map(|episode| group.iter().flat_map(move |channel| of_channel(episode, *channel)));
+    let steps: Vec<f64> = all.collect();
+    let usual = statistics::nearest_rank(steps.iter().copied(), 0.9)?.max(stated(log, group[0]).unwrap_or(0.0));
+    // Of what hardly moves and is rounded, the last digit.
+    let digit = || steps.iter().copied().filter(|step| *step > 0.0).reduce(f64::min);
+    if usual > 0.0 { Some(usual) } else { digit() }
+}
+
 /// Single readings, and of places up to [`MOST_AWAY`] in a row, that stand out from those before and after by far more than these from each other.
 ///
 /// Of places, which cannot go there and back; of forces only far beyond all others, and not where they may be a blow, which is as short. `blow`: whether one is
@@ -317,18 +337,7 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
     sizes.sort_by(|a, b| b.total_cmp(a));
     // But for a few.
     let beyond = BEYOND * sizes.get(FEW).copied()?;
-    // Nine in ten of all neighbours differ by less.
-    let of_channel = |episode: &Episode, channel: Channel| -> Vec<f64> {
-        let read: Vec<f64> = readings(episode, channel).map(|(_, value)| value).collect();
-        read.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect()
-    };
-    let all =
-        log.episodes.iter().flat_map(|episode| group.iter().flat_map(move |channel| of_channel(episode, *channel)));
-    let steps: Vec<f64> = all.collect();
-    let usual = statistics::nearest_rank(steps.iter().copied(), 0.9)?.max(stated(log, group[0]).unwrap_or(0.0));
-    // Of what hardly moves and is rounded, the last digit.
-    let digit = || steps.iter().copied().filter(|step| *step > 0.0).reduce(f64::min);
-    let usual = if usual > 0.0 { usual } else { digit()? };
+    let usual = usual_step(log, group)?;
     let mut far: Vec<(f64, u64, f64, Channel, f64, usize)> = Vec::new();
     for (index, episode) in log.episodes.iter().enumerate() {
         for channel in group {
@@ -338,10 +347,15 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
             {
                 let value = |i: usize| rows[i].1;
                 let secs = episode.time_secs[rows[3].0];
-                let long = burst > 1 && episode.time_secs[rows[2 + burst].0] - secs > AWAY_SECS;
-                let gone_secs = episode.time_secs[rows[3 + burst].0] - episode.time_secs[rows[2].0];
+                let apart = |a: usize, b: usize| episode.time_secs[rows[b].0] - episode.time_secs[rows[a].0];
+                let long = burst > 1 && apart(3, 2 + burst) > AWAY_SECS;
+                let gone_secs = apart(2, 3 + burst);
                 let along = matches!(channel, Channel::ObjectPosition(Axis::X | Axis::Y));
-                if long && (!along || gone_secs > AWAY_RESTING_SECS) {
+                if long && !along || !forces && gone_secs > AWAY_RESTING_SECS {
+                    continue;
+                }
+                // What was hidden before or after.
+                if (2..3 + burst).any(|i| apart(i, i + 1) > HIDDEN_SECS) {
                     continue;
                 }
                 let (before, after) = (value(2), value(3 + burst));
@@ -355,7 +369,10 @@ fn spikes(log: &Log, group: &[Channel], blow: &dyn Fn(usize, f64, f64) -> bool) 
                 let near = near.map(|(a, b)| (value(b) - value(a)).abs());
                 let limit = SPIKE * near.into_iter().fold(usual, f64::max);
                 let rests = (3..2 + burst).all(|i| SPIKE * (value(i + 1) - value(i)).abs() < alone);
-                if long && !rests {
+                // It rises and falls freely in that time.
+                let hops = matches!(channel, Channel::ObjectPosition(Axis::Z))
+                    && alone < HOP_MARGIN * log.header.gravity_mps2 * gone_secs.powi(2) / 8.0;
+                if long && !rests || hops {
                     continue;
                 }
                 if alone > limit && (!forces || (value(3).abs() > beyond && !blow(index, secs, value(3).abs()))) {
